@@ -211,8 +211,7 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "DEPTH.exr");
   add("--depth-scale", options.depth_scale,
       "Length of a 1 of that file, in the scene's units: 0.001 for a 16-bit PNG of millimetres and a scene "
-      "in "
-      "metres; files of whole numbers need one",
+      "in metres; files of whole numbers need one",
       "FLOAT");
   add("--depth-weight", method.depth.weight, "Factor on the weight that the residuals give it; 1 by default",
       "FLOAT");
