@@ -289,7 +289,9 @@ void add_info_command(CLI::App& application, CommonOptions& common) {
       application.add_subcommand("info", "Says what is in a mesh or a scene, and what dpr does with it");
   const auto file = std::make_shared<std::string>();
   const auto as_json = std::make_shared<bool>(false);
-  command->add_option("FILE", *file, "Mesh (OBJ, PLY, OFF, STL, glTF) or scene (JSON)")->required()->type_name("");
+  command->add_option("FILE", *file, "Mesh (OBJ, PLY, OFF, STL, glTF) or scene (JSON)")
+      ->required()
+      ->type_name("");
   command->add_flag("--json", *as_json, "Print JSON");
   add_output_options(*command, common);
   command->footer(
