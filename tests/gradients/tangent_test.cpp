@@ -65,6 +65,7 @@ TEST_SUITE("tangents") {
     std::map<std::string, unsigned> tried;
     const auto trials = static_cast<unsigned>(test::reduced(24, 1));
     for (const Attribute attribute : {Attribute::depth, Attribute::position, Attribute::normal}) {
+      if (test::is_reduced() && attribute == Attribute::position) continue;
       AttributeImages images(renderer.device(), attribute);
       for (unsigned seed = 1; seed <= trials; ++seed) {
         const Trial trial = random_trial(seed);
@@ -89,7 +90,7 @@ TEST_SUITE("tangents") {
         }
       }
     }
-    CHECK(tried.size() > static_cast<std::size_t>(test::reduced(18, 6)));
+    CHECK(tried.size() > static_cast<std::size_t>(test::reduced(18, 4)));
   }
 
   TEST_CASE("directions in groups, frames in bands: the same tangents") {

@@ -478,8 +478,9 @@ TEST_SUITE("robustness") {
     const dpr::Device device = dpr::open_device();
     const int size = reduced(32, 8);
     dpr::LeastSquares method = least_squares();
-    method.rotations = 8;
+    method.rotations = is_reduced() ? 2 : 8;
     for (const float grey : {0.0F, 0.5F, 1.0F}) {
+      if (is_reduced() && grey != 0.5F) continue;
       for (const float height : {0.0F, 100.0F}) {  // in sight; out of it
         for (const dpr::PoseLight light : {dpr::PoseLight::fixed, dpr::PoseLight::harmonics}) {
           CAPTURE(grey);
