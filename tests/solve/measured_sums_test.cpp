@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "solve/normal_equations.hpp"
+#include "support/difference.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
@@ -174,16 +175,7 @@ struct Run {
   Buffer<cl_float4> colors, depths, tangents, depth_tangents;
 };
 
-/// The greatest difference of the first n, relative to the greatest of what is expected.
-template <typename Values>
-double difference(const Values& found, const Values& expected, std::size_t n) {
-  double error = 0, size = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    error = std::max(error, std::abs(found[i] - expected[i]));
-    size = std::max(size, std::abs(expected[i]));
-  }
-  return error / size;
-}
+using test::difference;
 
 std::size_t pixels_tried() { return test::is_reduced() ? 77 : 1337; }
 

@@ -12,6 +12,7 @@
 
 #include "dpr/renderer.hpp"
 #include "solve/pose_level.hpp"
+#include "support/difference.hpp"
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
@@ -249,16 +250,7 @@ struct Run {
   HypothesisImages images;
 };
 
-/// The greatest difference of the first n, relative to the greatest of what is expected.
-template <typename Values>
-double difference(const Values& found, const Values& expected, std::size_t n) {
-  double error = 0, size = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    error = std::max(error, std::abs(found[i] - expected[i]));
-    size = std::max(size, std::abs(expected[i]));
-  }
-  return error / size;
-}
+using test::difference;
 
 constexpr std::array k_lights{PoseLight::fixed, PoseLight::gain, PoseLight::harmonics};
 
