@@ -16,19 +16,32 @@ static inline int is_in_range(float3 a, float3 b, float3 c, float zfar) {
          fmax(fmax(a.z, b.z), c.z) < INFINITY;
 }
 
-/// Assembles a triangle; returns whether it is kept.
-static inline int set_up(const FrameParams p, uint i, global const ViewParams* restrict views,
-                         global const uint4* restrict faces, global const float4* restrict ndc,
-                         global const float* restrict hidden, global uchar* restrict facing, Triangle* t) {
+/// Vertices of a face of a view.
+typedef struct {
+  float3 a, b, c;
+  uint view, mesh;
+} Corners;
+
+static inline Corners corners_of(const FrameParams p, uint i, global const uint4* restrict faces,
+                                 global const float4* restrict ndc) {
   const uint view = i / p.faces;
   const uint4 face = faces[i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
-  const float3 a = vertices[face.x].xyz, b = vertices[face.y].xyz, c = vertices[face.z].xyz;
+  const Corners corners = {vertices[face.x].xyz, vertices[face.y].xyz, vertices[face.z].xyz, view, face.w};
+  return corners;
+}
+
+/// Assembles a triangle; returns whether it is kept.
+static inline int set_up(const FrameParams p, uint i, const Corners corners,
+                         global const ViewParams* restrict views, global const float* restrict hidden,
+                         global uchar* restrict facing, Triangle* t) {
+  const float3 a = corners.a, b = corners.b, c = corners.c;
+  const uint view = corners.view;
   int orientation = orientation_of(a, b, c, views[view].znear);
   if ((float)orientation == p.culled) orientation = 0;
   facing[i] = facing_of(orientation);
   const PixelBounds bounds = bounds_of(p, fmin(fmin(a.xy, b.xy), c.xy), fmax(fmax(a.xy, b.xy), c.xy));
-  const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + face.w] &&
+  const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + corners.mesh] &&
                       is_in_range(a, b, c, views[view].zfar) && meets_image(p, bounds);
   if (!is_kept) return 0;
   const uint2 columns = samples_within(bounds.left, bounds.right, p.width);
@@ -50,8 +63,9 @@ static inline int set_up(const FrameParams p, uint i, global const ViewParams* r
 
 /// Assembles the triangles, and counts the tiles of each. Dropped is what has no orientation, is culled or
 /// not in range, cannot be seen, or whose blurred bounds miss the image; what is kept has no tile where its
-/// bounds hold no sample, or it is small and owns none. One work-item per (view, face); on GPUs the tiles of
-/// large ones are a group's to count.
+/// bounds hold no sample, or it is small and owns none. One work-item per (view, face), and the tiles of large ones
+/// are a group's to count; of a CPU one per DPR_FACE_GROUP faces, whose vertices it fetches together: where faces that
+/// follow each other lie far apart, it waits for memory once.
 /// in   views      ViewParams[view]
 /// in   faces      uint4[face]             vertex indices; w = mesh
 /// in   ndc        float4[view][vertex]
@@ -64,16 +78,15 @@ DPR_SHARING_KERNEL kernel void setup_forward(
     const FrameParams p, global const ViewParams* restrict views, global const uint4* restrict faces,
     global const float4* restrict ndc, global const float* restrict hidden, global uchar* restrict facing,
     global uchar* restrict kept, global uint* restrict counts, global Triangle* restrict triangles) {
-  const uint i = (uint)get_global_id(0);
-  const int is_face = i < p.views * p.faces;
-  Triangle t;
-  const int is_kept = is_face && set_up(p, i, views, faces, ndc, hidden, facing, &t);
-  if (is_face) kept[i] = is_kept ? 1 : 0;
+  const uint item = (uint)get_global_id(0), end = p.views * p.faces;
 #if DPR_LANES == 1
   local uint shared[DPR_GROUP], sums[DPR_GROUP];
+  Triangle t;
+  const int is_kept =
+      item < end && set_up(p, item, corners_of(p, item, faces, ndc), views, hidden, facing, &t);
   const int shares = is_kept && is_shared(t);
-  if (shares) triangles[i] = t;
-  const uint last = group_collect(shares, i, shared, sums);
+  if (shares) triangles[item] = t;
+  const uint last = group_collect(shares, item, shared, sums);
   barrier(CLK_GLOBAL_MEM_FENCE);
   for (uint k = 0; k < last; ++k) {
     const Triangle large = triangles[shared[k]];
@@ -81,10 +94,22 @@ DPR_SHARING_KERNEL kernel void setup_forward(
     if (get_local_id(0) == 0) counts[shared[k]] = sums[DPR_GROUP - 1];
     barrier(CLK_LOCAL_MEM_FENCE);
   }
-  if (shares) return;
-#endif
-  if (!is_face) return;
+  if (item < end) kept[item] = is_kept ? 1 : 0;
+  if (item >= end || shares) return;
   const uint count = is_kept ? count_tiles(p, t, rows_of(t) / DPR_TILE) : 0;
-  counts[i] = count;
-  if (count > 0) triangles[i] = t;
+  counts[item] = count;
+  if (count > 0) triangles[item] = t;
+#else
+  const uint first = item * DPR_FACE_GROUP, last = min(first + DPR_FACE_GROUP, end);
+  Corners corners[DPR_FACE_GROUP];
+  for (uint i = first; i < last; ++i) corners[i - first] = corners_of(p, i, faces, ndc);
+  for (uint i = first; i < last; ++i) {
+    Triangle t;
+    const int is_kept = set_up(p, i, corners[i - first], views, hidden, facing, &t);
+    const uint count = is_kept ? count_tiles(p, t, rows_of(t) / DPR_TILE) : 0;
+    kept[i] = is_kept ? 1 : 0;
+    counts[i] = count;
+    if (count > 0) triangles[i] = t;
+  }
+#endif
 }

@@ -31,6 +31,10 @@
 /// Pairs that a work-item handles in order, on devices whose lanes are vector registers (tile_lanes.h).
 #define DPR_PAIR_GROUP 8
 
+/// Faces, or corners, whose data a work-item fetches before it works on them, on such devices: they wait for memory
+/// together, which matters where neighbours in the mesh are none in its lists.
+#define DPR_FACE_GROUP 8
+
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 
