@@ -159,6 +159,32 @@ DPR_API dpr_status dpr_cut_size(const dpr_cut* cut, size_t* faces, size_t* verti
 DPR_API dpr_status dpr_cut_read(const dpr_cut* cut, const dpr_array* arrays, size_t count);
 DPR_API void dpr_cut_destroy(dpr_cut* cut);
 
+/* A mesh of a file: dpr/mesh.hpp has the formats and their errors. */
+typedef struct dpr_mesh_file dpr_mesh_file;
+
+/* What dpr_frame_render() takes of it; whole numbers are DPR_INT32. */
+typedef struct dpr_mesh_contents {
+  size_t size;
+  const dpr_array* arrays; /* [array_count] vertices, faces, and what else of a surface the file has */
+  size_t array_count;
+  const char* const* settings; /* [setting_count] "wrap" and "filter" of textures */
+  size_t setting_count;
+  const char* const* notes; /* [note_count] sentences: of what the file has, what is left out */
+  size_t note_count;
+} dpr_mesh_contents;
+
+#define DPR_MESH_CONTENTS_INIT \
+  { sizeof(dpr_mesh_contents), NULL, 0, NULL, 0, NULL, 0 }
+
+DPR_API dpr_status dpr_mesh_file_read(const char* path, dpr_mesh_file** file);
+/* Valid until the file is destroyed, and not to be written to. */
+DPR_API dpr_status dpr_mesh_file_contents(const dpr_mesh_file* file, dpr_mesh_contents* contents);
+DPR_API void dpr_mesh_file_destroy(dpr_mesh_file* file);
+/* Writes OBJ, PLY or GLB, by the extension: vertices [V, 3], faces, colors [V, 3] or face_colors [F, 3], and into GLB
+ * texture coordinates and textures. */
+DPR_API dpr_status dpr_mesh_file_write(const char* path, const dpr_array* arrays, size_t count,
+                                       const char* const* settings, size_t setting_count);
+
 #ifdef __cplusplus
 }
 #endif

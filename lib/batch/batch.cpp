@@ -242,6 +242,8 @@ namespace {
 constexpr int k_most_dimensions = 4;
 constexpr std::size_t k_most_words = 1U << 16U;
 
+}  // namespace
+
 std::vector<std::string> to_words(const char* const* words, std::size_t count, const char* argument) {
   if (count > 0) c::deref(words, argument);
   if (count > k_most_words)
@@ -250,8 +252,6 @@ std::vector<std::string> to_words(const char* const* words, std::size_t count, c
   for (const char* word : std::span(words, count)) copies.emplace_back(&c::deref(word, argument));
   return copies;
 }
-
-}  // namespace
 
 std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, const char* argument) {
   if (count > 0) c::deref(arrays, argument);

@@ -283,13 +283,12 @@ std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& option
   return lights;
 }
 
-Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
-  const BatchSizes sizes = check_sizes(arrays);
+Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::size_t vertices) {
   const NamedArray& faces = require(arrays, "faces");
   require_triples(faces);
   Surface surface;
   surface.textures = texture_forms(arrays, settings);
-  take_texcoords(arrays, faces, sizes.vertices, surface);
+  take_texcoords(arrays, faces, vertices, surface);
   const bool has_textures = !surface.textures.empty();
   if (has_textures == (surface.texcoords == 0)) {
     throw InvalidArgument(has_textures ? "texcoords (batch)" : "textures (batch)",
@@ -298,12 +297,14 @@ Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
   surface.materials = count_materials(arrays);
   surface.face_textures = read_of_faces(arrays, "face_textures", faces.shape[0], -1);
   surface.face_materials = read_of_faces(arrays, "face_materials", faces.shape[0], 0);
-  return {faces,
-          sizes.vertices,
-          find(arrays, "face_colors") != nullptr,
-          settings.width(),
-          settings.height(),
-          std::move(surface)};
+  return surface;
+}
+
+Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
+  const BatchSizes sizes = check_sizes(arrays);
+  Surface surface = make_surface(arrays, settings, sizes.vertices);
+  return {require(arrays, "faces"), sizes.vertices,    find(arrays, "face_colors") != nullptr,
+          settings.width(),         settings.height(), std::move(surface)};
 }
 
 RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {

@@ -23,6 +23,8 @@ BatchSizes check_sizes(NamedArrays arrays);
 std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings);
 /// None: colours as they are.
 std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& options);
+/// Texture coordinates, textures and materials of a mesh of so many vertices.
+Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::size_t vertices);
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings);
 /// The settings, with the numbers that are arrays.
 RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays);
@@ -38,6 +40,7 @@ void upload_surface(Renderer& renderer, NamedArrays arrays);
 
 /// From the C interface, which calls them `argument`.
 std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, const char* argument);
+std::vector<std::string> to_words(const char* const* words, std::size_t count, const char* argument);
 dpr_frame_options to_options(const dpr_frame_options* options);
 RenderSettings to_settings(const dpr_frame_options& options);
 

@@ -38,6 +38,8 @@ bool has_surface(const Mesh& mesh, const Surface& surface) {
          mesh.face_materials == surface.face_materials;
 }
 
+}  // namespace
+
 void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.texcoords.resize(surface.texcoords);
   mesh.face_texcoords = surface.face_texcoords;
@@ -50,8 +52,6 @@ void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.materials.resize(surface.materials);
   mesh.face_materials = surface.face_materials;
 }
-
-}  // namespace
 
 bool Topology::is_of(const Scene& scene) const {
   const Mesh& mesh = scene.meshes[0].mesh;

@@ -37,6 +37,9 @@ struct Surface {
   std::vector<std::uint32_t> face_textures, face_materials;
 };
 
+/// Makes room in a mesh without: numbers are yet to come.
+void add_surface(Mesh& mesh, const Surface& surface);
+
 /// Contents of the device that a renderer keeps from one batch to the next. Valid as long as the caller's
 /// array of faces is.
 struct Topology {

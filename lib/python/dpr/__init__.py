@@ -6,18 +6,21 @@ render() does all of it in one call; a Renderer keeps what stays the same from c
 lists, read those of float32 where they are and convert the rest, and differentiate with respect to vertices, colours,
 textures, materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and
 by render_with_vjp() and render_with_jvp() for all others. rasterize() puts the edges' noise around shading of one's own.
-look_at(), perspective() and cameras make views and intrinsics. The module dpr.nvdiffrast, imported by itself, has
+look_at(), perspective() and cameras make views and intrinsics, read_mesh() and write_mesh() arguments from files and
+files from them; MeshLoss, chamfer() and sample_points() are losses of shapes. The module dpr.nvdiffrast, imported by itself, has
 nvdiffrast's operations for PyTorch.
 """
 from . import cameras
 from ._least_squares import normal_equations
-from ._library import DeviceError, Error, InvalidArgument, devices, release
+from ._library import DeviceError, Error, InvalidArgument, IoError, devices, release
+from ._losses import MeshLoss, chamfer, sample_points
+from ._meshes import read_mesh, write_mesh
 from ._renderer import Renderer, rasterize, render, render_with_jvp, render_with_vjp, subdivide
 from ._samples import Samples
 from ._subdivision import Subdivision
 from ._version import VERSION as __version__
 from .cameras import look_at, perspective
 
-__all__ = ["DeviceError", "Error", "InvalidArgument", "Renderer", "Samples", "Subdivision", "cameras", "devices", "look_at",
-           "normal_equations", "perspective", "rasterize", "release", "render", "render_with_jvp", "render_with_vjp",
-           "subdivide"]
+__all__ = ["DeviceError", "Error", "InvalidArgument", "IoError", "MeshLoss", "Renderer", "Samples", "Subdivision", "cameras",
+           "chamfer", "devices", "look_at", "normal_equations", "perspective", "rasterize", "read_mesh", "release", "render",
+           "render_with_jvp", "render_with_vjp", "sample_points", "subdivide", "write_mesh"]

@@ -50,16 +50,17 @@ def frames_of(parts):
     return tuple((tuple(settings), tuple(own)) for settings, own in frames.values())
 
 
-def _words(words):
-    return (ctypes.c_char_p * len(words))(*(word.encode() for word in words)), len(words)
+def words(texts):
+    """(char*[], count)"""
+    return (ctypes.c_char_p * len(texts))(*(text.encode() for text in texts)), len(texts)
 
 
 def options_of(spec, settings=(), first_view=0, gradients=()):
     """Options, which keep their words alive."""
     options = _library.Options(ctypes.sizeof(_library.Options), spec.device.encode(), spec.width, spec.height)
-    options.settings, options.setting_count = _words([*spec.settings, *settings])
+    options.settings, options.setting_count = words([*spec.settings, *settings])
     options.is_lit, options.first_view = spec.is_lit, first_view
-    options.gradients, options.gradient_count = _words(gradients)
+    options.gradients, options.gradient_count = words(gradients)
     return options
 
 

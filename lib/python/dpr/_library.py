@@ -21,11 +21,15 @@ class InvalidArgument(Error, ValueError):
     """An argument has a value that cannot be used."""
 
 
+class IoError(Error, OSError):
+    """A file cannot be read or written."""
+
+
 class DeviceError(Error):
     """An OpenCL call failed, or a kernel did not compile."""
 
 
-_ERRORS = {1: InvalidArgument, 3: DeviceError, 4: DeviceError, 5: MemoryError}
+_ERRORS = {1: InvalidArgument, 2: IoError, 3: DeviceError, 4: DeviceError, 5: MemoryError}
 """By the values of dpr_status."""
 
 
@@ -46,6 +50,13 @@ class Options(ctypes.Structure):
 class Raster(ctypes.Structure):
     """dpr_raster"""
     _fields_ = [(name, ctypes.c_int) for name in ("width", "height", "supersampling", "margin")]
+
+
+class MeshContents(ctypes.Structure):
+    """dpr_mesh_contents"""
+    _fields_ = [("size", ctypes.c_size_t), ("arrays", ctypes.POINTER(Array)), ("array_count", ctypes.c_size_t),
+                ("settings", ctypes.POINTER(ctypes.c_char_p)), ("setting_count", ctypes.c_size_t),
+                ("notes", ctypes.POINTER(ctypes.c_char_p)), ("note_count", ctypes.c_size_t)]
 
 
 class DeviceInfo(ctypes.Structure):
@@ -76,6 +87,9 @@ _SIGNATURES = {
     "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],
     "dpr_cut_size": [_HANDLE, ctypes.POINTER(_SIZE), ctypes.POINTER(_SIZE)],
     "dpr_cut_read": [_HANDLE, *_ARRAYS],
+    "dpr_mesh_file_read": [ctypes.c_char_p, ctypes.POINTER(_HANDLE)],
+    "dpr_mesh_file_contents": [_HANDLE, ctypes.POINTER(MeshContents)],
+    "dpr_mesh_file_write": [ctypes.c_char_p, *_ARRAYS, ctypes.POINTER(ctypes.c_char_p), _SIZE],
 }
 
 
@@ -111,7 +125,7 @@ def _load():
     library.dpr_frame_settings.restype = ctypes.c_char_p
     for name, arguments in _SIGNATURES.items():
         getattr(library, name).argtypes = arguments
-    for name in ("dpr_frame_destroy", "dpr_cut_destroy"):
+    for name in ("dpr_frame_destroy", "dpr_cut_destroy", "dpr_mesh_file_destroy"):
         getattr(library, name).argtypes, getattr(library, name).restype = [_HANDLE], None
     return library
 

@@ -1,0 +1,85 @@
+"""Files of meshes."""
+import ctypes
+import os
+import warnings
+from typing import Any, Dict, Optional, Sequence, Union
+
+import numpy as np
+
+from . import _arrays, _frames, _library
+
+Array = Any
+_TYPES = (ctypes.c_float, ctypes.c_int32, ctypes.c_int64)
+
+
+def _copied(array):
+    """Indices become int64, by which tensors too can be indexed."""
+    shape = tuple(array.shape[:array.dimensions])
+    kind = _TYPES[array.element]
+    values = np.ctypeslib.as_array(ctypes.cast(array.data, ctypes.POINTER(kind)), shape).copy()
+    return values if kind is ctypes.c_float else values.astype(np.int64)
+
+
+def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
+    """Arguments of render() for the mesh of a file: OBJ, PLY, OFF, STL, glTF or GLB.
+
+        mesh = dpr.read_mesh("spot.obj")
+        image = dpr.render(**mesh, views=views, intrinsics=intrinsics, width=256, height=256)
+
+    vertices [V, 3] in object space and faces [F, 3], and what the file has of colors [V, 3] or face_colors [F, 3],
+    texcoords [T, 2] with face_texcoords [F, 3], textures (a list of [H, W, 3], linear RGB), wrap and filter (a list of
+    words), face_textures [F], materials and face_materials [F]: NumPy's float32 and int64, as Renderer has them. Polygons
+    become fans of triangles. A UserWarning tells what is left out. Raises OSError (dpr.IoError) where the file is missing
+    or malformed, ValueError (dpr.InvalidArgument) where it cannot be rendered.
+    """
+    handle = ctypes.c_void_p()
+    _library.call("dpr_mesh_file_read", os.fsencode(file), ctypes.byref(handle))
+    try:
+        contents = _library.MeshContents(size=ctypes.sizeof(_library.MeshContents))
+        _library.call("dpr_mesh_file_contents", handle, ctypes.byref(contents))
+        mesh, textures, materials = {}, [], {}
+        for array in contents.arrays[:contents.array_count]:
+            kind, _, name = array.name.decode().partition(".")
+            if kind.startswith("textures["):
+                textures.append(_copied(array))
+            elif kind == "materials":
+                materials[name] = _copied(array)
+            else:
+                mesh[kind] = _copied(array)
+        if textures:
+            mesh["textures"] = textures
+        if materials:
+            mesh["materials"] = materials
+        for text in contents.settings[:contents.setting_count]:
+            name, _, words = text.decode().partition("=")
+            mesh[name] = words.split(",")
+        for note in contents.notes[:contents.note_count]:
+            warnings.warn("dpr: " + note.decode(errors="replace"), stacklevel=2)
+    finally:
+        _library.library.dpr_mesh_file_destroy(handle)
+    return mesh
+
+
+def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Array, *, colors: Optional[Array] = None,
+               face_colors: Optional[Array] = None, texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None,
+               textures: Any = None, face_textures: Optional[Array] = None, wrap: Union[str, Sequence[str]] = "repeat",
+               filter: Union[str, Sequence[str]] = "bilinear") -> None:
+    """Writes a mesh as OBJ, PLY or GLB, by the extension, whole or not at all.
+
+    The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8 bits;
+    OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1]. Raises OSError (dpr.IoError) where the file cannot
+    be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
+    """
+    named = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors, "texcoords": texcoords,
+             "face_texcoords": face_texcoords, "face_textures": face_textures}
+    textures = [] if textures is None else textures if isinstance(textures, (list, tuple)) else [textures]
+    named.update((f"textures[{i}]", texture) for i, texture in enumerate(textures))
+    packed = []
+    for name, array in named.items():
+        if array is not None:
+            is_indices = name.startswith("face") and name != "face_colors"
+            array = _arrays.converted(name, _arrays.from_numbers(array, is_indices), is_indices)
+            packed.append((name, np.ascontiguousarray(_arrays.to_numpy(array))))
+    words = [(name, [value] if isinstance(value, str) else list(value)) for name, value in (("wrap", wrap), ("filter", filter))]
+    settings = [f"{name}={','.join(value)}" for name, value in words] if textures else []
+    _library.call("dpr_mesh_file_write", os.fsencode(file), *_frames.c_arrays(packed), *_frames.words(settings))
