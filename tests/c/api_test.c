@@ -746,6 +746,39 @@ static void test_own_opencl(const dpr_scene* scene) {
   clReleaseContext(context);
 }
 
+/* Arrays into a file, and back. */
+static void test_mesh_files(void) {
+  static const char* const path = "c_api_mesh.ply";
+  float vertices[9], colors[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, texels[3] = {1, 1, 1};
+  int32_t of_faces[] = {0, 1, 2};
+  const dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 2, {3, 3}},
+                              {"faces", of_faces, DPR_INT32, 2, {1, 3}},
+                              {"colors", colors, DPR_FLOAT32, 2, {3, 3}},
+                              {"textures[0]", texels, DPR_FLOAT32, 3, {1, 1, 3}}};
+  const char* const unknown[] = {"wrap=round"};
+  dpr_mesh_contents contents = DPR_MESH_CONTENTS_INIT;
+  dpr_mesh_file* file = NULL;
+  memcpy(vertices, positions, sizeof vertices);
+  REFUSED(dpr_mesh_file_write(path, arrays, 1, NULL, 0), "faces");
+  REFUSED(dpr_mesh_file_write(path, arrays, 4, NULL, 0), "texcoords");
+  REFUSED(dpr_mesh_file_write(path, arrays, 3, unknown, 1), "wrap");
+  REFUSED(dpr_mesh_file_write(NULL, arrays, 3, NULL, 0), "path");
+  EXPECT(dpr_mesh_file_read(path, &file) == DPR_IO_ERROR && file == NULL);
+  OK(dpr_mesh_file_write(path, arrays, 3, NULL, 0));
+  REFUSED(dpr_mesh_file_read(path, NULL), "file");
+  OK(dpr_mesh_file_read(path, &file));
+  OK(dpr_mesh_file_contents(file, &contents));
+  EXPECT(contents.array_count == 3 && contents.setting_count == 0 && contents.note_count == 0);
+  EXPECT(strcmp(contents.arrays[1].name, "faces") == 0 && contents.arrays[1].element == DPR_INT32);
+  EXPECT(contents.arrays[0].shape[0] == 3 && memcmp(contents.arrays[0].data, vertices, sizeof vertices) == 0);
+  EXPECT(memcmp(contents.arrays[2].data, colors, sizeof colors) == 0);
+  contents.size = 1;
+  REFUSED(dpr_mesh_file_contents(file, &contents), "contents.size");
+  dpr_mesh_file_destroy(file);
+  REFUSED(dpr_mesh_file_contents(file, &contents), "file");
+  EXPECT(remove(path) == 0);
+}
+
 /* A frame of named arrays: <u, J v> = <J^T u, v> of two directions at once, and tangents that are refused. */
 static void test_frame_tangents(void) {
   static float pixels[FLOATS], tangents[2 * FLOATS], weights[FLOATS], texels[3] = {1, 1, 1};
@@ -1508,6 +1541,7 @@ int main(void) {
   test_own_opencl(scene);
   test_cameras(device);
   test_frame_tangents();
+  test_mesh_files();
   test_frame_samples();
   test_setters(device);
   test_mesh_loss(device, scene);
