@@ -6,9 +6,9 @@ render() does all of it in one call; a Renderer keeps what stays the same from c
 lists, read those of float32 where they are and convert the rest, and differentiate with respect to vertices, colours,
 textures, materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and
 by render_with_vjp() and render_with_jvp() for all others. rasterize() puts the edges' noise around shading of one's own.
-look_at(), perspective() and cameras make views and intrinsics, read_mesh() and write_mesh() arguments from files and
-files from them; MeshLoss, chamfer() and sample_points() are losses of shapes. The module dpr.nvdiffrast, imported by itself, has
-nvdiffrast's operations for PyTorch.
+look_at(), perspective() and cameras make views and intrinsics; read_mesh() makes arguments of a file, and write_mesh() a
+file of arguments; MeshLoss, chamfer() and sample_points() are losses of shapes. Two modules for PyTorch are imported by
+themselves: dpr.shading has materials, environments and shadows, dpr.nvdiffrast nvdiffrast's operations.
 """
 from . import cameras
 from ._least_squares import normal_equations
