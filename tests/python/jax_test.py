@@ -76,6 +76,17 @@ class JaxTest(unittest.TestCase):
             losses.append(float(loss))
         self.assertLess(min(losses), 0.2 * losses[0])
 
+    def test_losses_of_shapes(self):
+        """Values are NumPy's, and gradients those of differences, traced by jit too."""
+        losses, step = dpr.MeshLoss(SQUARE_FACES), random(5, 3, seed=2) - 0.5
+        terms = [losses.laplacian, losses.edge_length, losses.normal_consistency, losses.flatness,
+                 lambda vertices: dpr.chamfer(dpr.sample_points(vertices, SQUARE_FACES, 40, seed=1), TETRAHEDRON)]
+        for term in terms:
+            np.testing.assert_allclose(term(jnp.asarray(SQUARE)), term(SQUARE), rtol=1e-5)
+            gradient = jax.jit(jax.grad(term))(jnp.asarray(SQUARE))
+            change = (term(SQUARE + 1e-3 * step) - term(SQUARE - 1e-3 * step)) / 2e-3
+            np.testing.assert_allclose((gradient * step).sum(), change, rtol=1e-2, atol=1e-3)
+
     def test_wrong_arguments(self):
         views, intrinsics = cameras(1)
         with self.assertRaisesRegex(TypeError, "vertices .* got int32, expected float32"):

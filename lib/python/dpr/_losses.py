@@ -119,36 +119,50 @@ class MeshLoss:
                          f"[V, 3] or [N, V, 3], V at least {self._vertices}", "dpr.MeshLoss")
 
 
+def _constant(array):
+    """(module with functions of arrays, the values without derivatives): JAX's own, also while it traces."""
+    if _arrays.module_of(array) == "jax":
+        jax = sys.modules["jax"]
+        return jax.numpy, jax.lax.stop_gradient(array)
+    return np, np.asarray(_arrays.to_numpy(array), np.float32)
+
+
 def sample_points(vertices: Array, faces: Array, count: int, seed: Optional[int] = None) -> Array:
     """Points of a mesh's surface, uniform by area: [count, 3], of vertices [V, 3] and faces [F, 3]. With PyTorch and JAX a
     function of the vertices. seed: of NumPy's generator; other points every time without. Raises ValueError for a
-    surface without area."""
+    surface without area, but not while JAX traces."""
     faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True)).astype(np.int64)
-    corners = np.asarray(_arrays.to_numpy(vertices), np.float64)[faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=-1)
-    if not np.isfinite(areas).all() or not areas.sum() > 0:
+    lib, values = _constant(vertices)
+    values = values.astype(np.float64) if lib is np else values
+    a, b, c = (values[faces[:, k]] for k in range(3))
+    sums = lib.cumsum((_cross(b - a, c - a) ** 2).sum(-1) ** 0.5)
+    if lib is np and not (len(faces) and 0 < sums[-1] < np.inf):
         _arrays.fail(ValueError, "vertices", "a surface without area", "finite vertices and faces", "dpr.sample_points")
     random = np.random.default_rng(seed)
-    of_face = faces[random.choice(len(faces), count, p=areas / areas.sum())]
+    chosen = lib.searchsorted(sums, random.random(count) * sums[-1], side="right").clip(0, len(faces) - 1)
     root, along = random.random((count, 1)) ** 0.5, random.random((count, 1))
     weights = np.concatenate([1 - root, root * (1 - along), root * along], 1)[..., None]
-    return (vertices[of_face] * _like(vertices, weights)).sum(-2)
+    corners = vertices[(lib.asarray(faces) if lib is not np else faces)[chosen]]
+    return (corners * _like(vertices, weights)).sum(-2)
 
 
-def _nearest(points, others):
+def _nearest(lib, points, others):
     """[N] indices of the others; O(N M) time."""
     squares = (others * others).sum(-1)
-    return np.concatenate([(squares - 2 * points[first:first + 1024] @ others.T).argmin(-1)
-                           for first in range(0, len(points), 1024)])
+    return lib.concatenate([(squares - 2 * points[first:first + 1024] @ others.T).argmin(-1)
+                            for first in range(0, len(points), 1024)])
 
 
 def chamfer(points: Array, others: Array) -> Array:
     """Mean squared distance of points [N, 3] to their nearest of the others [M, 3], and the reverse, added up. With PyTorch
-    and JAX a function of both, but not within jit. O(N M). Raises ValueError for other shapes."""
+    and JAX a function of both. O(N M). Raises ValueError for other shapes."""
     for name, array in (("points", points), ("others", others)):
         if len(array.shape) != 2 or array.shape[-1] != 3 or not array.shape[0]:
             _arrays.fail(ValueError, name, list(array.shape), "[N, 3]", "dpr.chamfer")
-    values, other_values = (np.asarray(_arrays.to_numpy(array), np.float32) for array in (points, others))
-    there = points - others[_nearest(values, other_values)]
-    back = others - points[_nearest(other_values, values)]
+    (lib, values), (other_lib, other_values) = _constant(points), _constant(others)
+    if lib is not other_lib:
+        lib = lib if lib is not np else other_lib
+        points, others = lib.asarray(points), lib.asarray(others)  # NumPy's take no indices that JAX traces
+    there = points - others[_nearest(lib, values, other_values)]
+    back = others - points[_nearest(lib, other_values, values)]
     return (there * there).sum(-1).mean() + (back * back).sum(-1).mean()
