@@ -77,7 +77,7 @@ DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ, PLY or GLB, by the extension, through a temporary file that is renamed at the end. GLB takes all
-/// but materials; textures become PNG within it, sRGB in 8 bits. OBJ has no face colours: asking for that is an
+/// but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the faces. OBJ has no face colours: asking for that is an
 /// error, not a silent loss. PLY colours are bytes, as other programs expect them: clamped to [0, 1] and rounded;
 /// it has no texture coordinates and normals. Of OBJ and PLY textures are no part, see write_texture(). Throws
 /// IoError, and InvalidArgument where the mesh is not valid.

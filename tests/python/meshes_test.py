@@ -61,6 +61,11 @@ class FilesTest(unittest.TestCase):
         (self.folder / "mesh.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
         with self.assertWarnsRegex(UserWarning, "none.mtl"):
             dpr.read_mesh(self.folder / "mesh.obj")
+        (self.folder / "none.mtl").write_text("newmtl red\nKd 1 0 0\nKs 0.5 0.5 0.5\nNs 20\nillum 2\n")
+        mesh = dpr.read_mesh(self.folder / "mesh.obj")
+        np.testing.assert_allclose(mesh["materials"]["specular"], [[0.5] * 3])
+        with self.assertWarnsRegex(UserWarning, "without materials"):
+            dpr.write_mesh(self.folder / "mesh.glb", **mesh)
 
     def test_errors_leave_no_file(self):
         vertices, faces = octahedron()

@@ -119,14 +119,24 @@ class EnvironmentTest(unittest.TestCase):
         total = environment.shade(*tensors[:2], color, 0.5, tensors[2]).sum()
         total.backward()  # linear in the image
         self.assertAlmostEqual(float((image.grad * image).sum()), float(total.detach()), 6)
+        environment = shading.Environment(image.detach())
+        for value in (0.0, 0.2, 0.4, 0.5, 0.9, 1.0):  # between two levels, and at one
+            rough = torch.tensor(value, requires_grad=True)
+            environment.specular(tensors[0].detach(), rough).sum().backward()
+            ends = [torch.tensor(min(max(value + step, 0), 1)) for step in ((-1e-3, 0) if value == 1 else (0, 1e-3))]
+            change = [environment.specular(tensors[0].detach(), end).sum() for end in ends]
+            self.assertAlmostEqual(float(rough.grad), float((change[1] - change[0]).detach()) / 1e-3, delta=1e-2)
         poles = torch.stack((UP, -UP, 0 * UP)).requires_grad_()
         shading.Environment(random(8, 16, 3)).shade(poles, UP, torch.ones(3), 0.5, 0.5).sum().backward()
         self.assertTrue(poles.grad.isfinite().all())
 
     def test_refusals(self):
-        for image in (random(8, 8, 3), random(8, 16, 4), [[1.0]]):
-            with self.assertRaisesRegex(ValueError, r"image \(dpr.shading\): .*\[H, 2 H, 3\]"):
+        for image, message in ((random(8, 8, 3), r"\[8, 8, 3\]"), (random(8, 16, 4), r"\[8, 16, 4\]"),
+                               (random(8, 16, 3).numpy(), "ndarray.*a tensor of PyTorch")):
+            with self.assertRaisesRegex(ValueError, r"image \(dpr.shading\): got " + message + r".*\[H, 2 H, 3\]"):
                 shading.Environment(image)
+        with self.assertRaisesRegex(ValueError, "vertices.*a tensor of PyTorch"):
+            shading.vertex_normals(random(4, 3).numpy(), torch.tensor([[0, 1, 2]]))
 
 
 class SurfaceTest(unittest.TestCase):

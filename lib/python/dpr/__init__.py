@@ -7,9 +7,11 @@ lists, read those of float32 where they are and convert the rest, and differenti
 textures, materials, cameras, background, lights, sigma or blur, gamma and alpha: by the graph of PyTorch and JAX, and
 by render_with_vjp() and render_with_jvp() for all others. rasterize() puts the edges' noise around shading of one's own.
 look_at(), perspective() and cameras make views and intrinsics; read_mesh() makes arguments of a file, and write_mesh() a
-file of arguments; MeshLoss, chamfer() and sample_points() are losses of shapes. Two modules for PyTorch are imported by
-themselves: dpr.shading has materials, environments and shadows, dpr.nvdiffrast nvdiffrast's operations.
+file of arguments; MeshLoss, chamfer() and sample_points() are losses of shapes. Two modules are for PyTorch
+alone: dpr.shading has materials, environments and shadows, dpr.nvdiffrast nvdiffrast's operations.
 """
+import importlib
+
 from . import cameras
 from ._least_squares import normal_equations
 from ._library import DeviceError, Error, InvalidArgument, IoError, devices, release
@@ -24,3 +26,10 @@ from .cameras import look_at, perspective
 __all__ = ["DeviceError", "Error", "InvalidArgument", "IoError", "MeshLoss", "Renderer", "Samples", "Subdivision", "cameras",
            "chamfer", "devices", "look_at", "normal_equations", "perspective", "rasterize", "read_mesh", "release", "render",
            "render_with_jvp", "render_with_vjp", "sample_points", "subdivide", "write_mesh"]
+
+
+def __getattr__(name):
+    """The modules that import PyTorch, when they are first asked for."""
+    if name in ("nvdiffrast", "shading"):
+        return importlib.import_module("." + name, __name__)
+    raise AttributeError(f"module 'dpr' has no attribute '{name}'")

@@ -64,18 +64,18 @@ def as_type(array, name):
     return array.astype(name) if kind == "jax" else to_numpy(array).astype(name, copy=False)
 
 
-def converted(name, array, is_indices=False):
+def converted(name, array, is_indices=False, where="dpr.render"):
     """The array as float32, or as int32 or int64. Fails for no array and for another kind of numbers."""
     if not is_array(array):
-        fail(TypeError, name, type(array).__name__, "a tensor or an array")
+        fail(TypeError, name, type(array).__name__, "a tensor or an array", where)
     kind = array.dtype.name if isinstance(array, np.ndarray) else type_of(array)
     if is_indices:
         if not kind.startswith(("int", "uint")):
-            fail(TypeError, name, kind, "int64 or int32, indices")
+            fail(TypeError, name, kind, "int64 or int32, indices", where)
         wanted = kind if kind in ("int64", "int32") else "int32" if module_of(array) == "jax" else "int64"
     else:
         if not kind.startswith(("float", "bfloat")):
-            fail(TypeError, name, kind, "float32, or another type of floating-point numbers")
+            fail(TypeError, name, kind, "float32, or another type of floating-point numbers", where)
         wanted = "float32"
     return array if type_of(array) == wanted else as_type(array, wanted)
 

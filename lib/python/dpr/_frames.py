@@ -179,7 +179,7 @@ class Rendered:
             except _library.InvalidArgument as error:
                 if len(frames) == 1:
                     raise
-                text = str(error).replace("(batch)", f"(view {i})").replace("meshes[0]", f"view {i}")
+                text = str(error).replace("(dpr.render)", f"(view {i})").replace("meshes[0]", f"view {i}")
                 raise _library.InvalidArgument(text) from None
             _library.call("dpr_frame_read", frame.handle, *c_arrays([(name, array[rows]) for name, array in raw.items()]))
             self._frames.append((frame, parts, rows))

@@ -149,7 +149,8 @@ def call(name, *arguments):
     """Calls a function that returns a dpr_status."""
     status = getattr(library, name)(*arguments)
     if status:
-        raise _ERRORS.get(status, Error)("dpr: error: " + library.dpr_last_error().decode(errors="replace"))
+        text = library.dpr_last_error().decode(errors="replace").replace("(batch)", "(dpr.render)")
+        raise _ERRORS.get(status, Error)("dpr: error: " + text)
 
 
 def devices() -> List[Dict[str, Any]]:

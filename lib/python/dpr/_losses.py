@@ -65,7 +65,8 @@ class MeshLoss:
     """
 
     def __init__(self, faces: Array):
-        faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True)).astype(np.int64)
+        faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.MeshLoss"))
+        faces = faces.astype(np.int64)
         if faces.ndim != 2 or faces.shape[-1] != 3 or (faces.size and faces.min() < 0):
             _arrays.fail(ValueError, "faces", list(faces.shape), "[F, 3], indices from 0 on", "dpr.MeshLoss")
         self._vertices = int(faces.max()) + 1 if faces.size else 0
@@ -131,7 +132,8 @@ def sample_points(vertices: Array, faces: Array, count: int, seed: Optional[int]
     """Points of a mesh's surface, uniform by area: [count, 3], of vertices [V, 3] and faces [F, 3]. With PyTorch and JAX a
     function of the vertices. seed: of NumPy's generator; other points every time without. Raises ValueError for a
     surface without area, but not while JAX traces."""
-    faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True)).astype(np.int64)
+    faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.sample_points"))
+    faces = faces.astype(np.int64)
     lib, values = _constant(vertices)
     values = values.astype(np.float64) if lib is np else values
     a, b, c = (values[faces[:, k]] for k in range(3))

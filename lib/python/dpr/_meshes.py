@@ -63,13 +63,17 @@ def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
 def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Array, *, colors: Optional[Array] = None,
                face_colors: Optional[Array] = None, texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None,
                textures: Any = None, face_textures: Optional[Array] = None, wrap: Union[str, Sequence[str]] = "repeat",
-               filter: Union[str, Sequence[str]] = "bilinear") -> None:
+               filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None,
+               face_materials: Optional[Array] = None) -> None:
     """Writes a mesh as OBJ, PLY or GLB, by the extension, whole or not at all.
 
     The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8 bits;
-    OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1]. Raises OSError (dpr.IoError) where the file cannot
+    OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1] as texels are. GLB numbers vertices anew, in the order
+    of the faces, and has none that no face uses. Materials are left out, with a UserWarning. Raises OSError (dpr.IoError) where the file cannot
     be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
     """
+    if materials is not None or face_materials is not None:
+        warnings.warn(f"dpr: {file} is written without materials", stacklevel=2)
     named = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors, "texcoords": texcoords,
              "face_texcoords": face_texcoords, "face_textures": face_textures}
     textures = [] if textures is None else textures if isinstance(textures, (list, tuple)) else [textures]
@@ -78,7 +82,7 @@ def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Arr
     for name, array in named.items():
         if array is not None:
             is_indices = name.startswith("face") and name != "face_colors"
-            array = _arrays.converted(name, _arrays.from_numbers(array, is_indices), is_indices)
+            array = _arrays.converted(name, _arrays.from_numbers(array, is_indices), is_indices, "dpr.write_mesh")
             packed.append((name, np.ascontiguousarray(_arrays.to_numpy(array))))
     words = [(name, [value] if isinstance(value, str) else list(value)) for name, value in (("wrap", wrap), ("filter", filter))]
     settings = [f"{name}={','.join(value)}" for name, value in words] if textures else []

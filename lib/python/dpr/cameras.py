@@ -101,8 +101,12 @@ def look_at(eye: Array, target: Array = (0, 0, 0), up: Array = (0, 1, 0)) -> Arr
 
 
 def perspective(fov_y_degrees: Array, width: int, height: int) -> Array:
-    """Intrinsics [N, 4] of a field of view from the lower to the upper edge, a number or [N]; the axis is in the middle."""
+    """Intrinsics [N, 4] of a field of view from the lower to the upper edge, a number or [N]; the axis is in the middle.
+    Raises ValueError for an angle that is not between 0 and 180 degrees."""
     lib, (fov,) = _together(fov_y_degrees)
+    known = _known(fov)
+    if known is not None and not ((known > 0) & (known < 180)).all():
+        _fail("fov_y_degrees", np.asarray(known).tolist(), "degrees, above 0 and below 180")
     return _intrinsics(lib, (height / 2) / lib.tan(_batch("fov_y_degrees", fov) * (np.pi / 360)), width, height)
 
 

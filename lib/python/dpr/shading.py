@@ -35,8 +35,10 @@ def _fail(name, got, expected):
 
 
 def _require(name, tensor, last, expected):
-    if not isinstance(tensor, Tensor) or tensor.ndim == 0 or tensor.shape[-1] not in last:
-        _fail(name, list(getattr(tensor, "shape", ())) or type(tensor).__name__, expected)
+    if not isinstance(tensor, Tensor):
+        _fail(name, type(tensor).__name__, "a tensor of PyTorch, " + expected)
+    if tensor.ndim == 0 or tensor.shape[-1] not in last:
+        _fail(name, list(tensor.shape), expected)
 
 
 def unit(vectors: Tensor) -> Tensor:
@@ -58,6 +60,8 @@ def _gathered(of_corners, indices, count):
 def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
     """Unit normals of vertices [V, 3] or [N, V, 3]: means of the faces' [F, 3], weighted by area, as the renderer's lights
     have them. 0 where a vertex has no face with area."""
+    _require("vertices", vertices, (3,), "[V, 3] or [N, V, 3]")
+    _require("faces", faces, (3,), "[F, 3]")
     a, b, c = vertices[..., faces.long(), :].unbind(-2)
     normals = torch.cross(b - a, c - a, -1)
     return unit(_gathered(normals.unsqueeze(-2).expand(*normals.shape[:-1], 3, 3), faces.long(), vertices.shape[-2]))
@@ -68,6 +72,8 @@ def vertex_tangents(vertices: Tensor, faces: Tensor, texcoords: Tensor, face_tex
     out); to be interpolated with faces=face_texcoords. The first three are the unit direction in which u grows on the
     surface, weighted by area; the last is the side of v, 1 or -1, as glTF has it. A texture that is mirrored along a seam
     needs texcoords of its own on either side."""
+    for name, tensor, last in (("vertices", vertices, 3), ("faces", faces, 3), ("texcoords", texcoords, 2)):
+        _require(name, tensor, (last,), f"[..., {last}]")
     index = faces.long() if face_texcoords is None else face_texcoords.long()
     a, b, c = vertices[faces.long()].unbind(-2)
     (u1, v1), (u2, v2) = ((texcoords[index[:, k]] - texcoords[index[:, 0]]).unbind(-1) for k in (1, 2))
@@ -110,6 +116,8 @@ def metallic_roughness(normal: Tensor, to_eye: Tensor, to_light: Tensor, base_co
     base_color                [..., 3] or [3], linear RGB from 0 to 1
     metallic, roughness       [..., 1] or a number, from 0 to 1; roughness squared is GGX's alpha, at least 0.001
     """
+    for name, tensor in (("normal", normal), ("to_eye", to_eye), ("to_light", to_light)):
+        _require(name, tensor, (3,), "[..., 3]")
     half = unit(to_eye + to_light)
     cos_light, cos_eye = _dot(normal, to_light).clamp(min=0), _dot(normal, to_eye).clamp(min=1e-4)
     cos_half, cos_both = _dot(normal, half).clamp(0, 1), _dot(to_eye, half).clamp(0, 1)
@@ -197,9 +205,9 @@ class Environment:
     _HEIGHT, _LEVELS = 32, 6
 
     def __init__(self, image: Tensor):
-        if not isinstance(image, Tensor) or image.ndim != 3 or image.shape[-1] != 3 or \
-                image.shape[1] != 2 * image.shape[0] or not image.shape[0]:
-            _fail("image", list(getattr(image, "shape", ())) or type(image).__name__, "[H, 2 H, 3]")
+        _require("image", image, (3,), "[H, 2 H, 3]")
+        if image.ndim != 3 or image.shape[1] != 2 * image.shape[0] or not image.shape[0]:
+            _fail("image", list(image.shape), "[H, 2 H, 3]")
         self.image = image
         size = (self._HEIGHT, 2 * self._HEIGHT)
         small = torch.nn.functional.adaptive_avg_pool2d(image.permute(2, 0, 1), size).permute(1, 2, 0).reshape(-1, 3)
@@ -227,10 +235,12 @@ class Environment:
         """Mean radiance [..., 3] around reflected directions [..., 3], for a roughness [..., 1] or a number, 0 to 1."""
         levels = [self.image, *self._means[1:]]
         place = torch.as_tensor(roughness, dtype=directions.dtype).clamp(0, 1) * (len(levels) - 1)
-        total = 0
+        lower = place.detach().floor().clamp(max=len(levels) - 2)
+        above, total = place - lower, torch.zeros_like(directions)
         for k, level in enumerate(levels):
-            weight = (1 - (place - k).abs()).clamp(min=0)
-            if weight.numel() > 1 or float(weight) > 0:
+            is_lower, is_upper = lower == k, lower == k - 1
+            if bool((is_lower | is_upper).any()):
+                weight = torch.where(is_lower, 1 - above, torch.where(is_upper, above, torch.zeros_like(above)))
                 total = total + weight * self._at(level, directions)
         return total
 
@@ -258,14 +268,18 @@ class ShadowMap:
 
     The map holds mean and mean square of the depths, under the noise; a point behind the mean is lit by Chebyshev's bound
     (variance shadow maps, Donnelly and Lauritzen 2006): exact for one edge above a surface facing the light, too bright
-    where several surfaces throw shadows on top of each other. Raises ValueError for cameras of other forms.
+    where several surfaces throw shadows on top of each other. On a surface that shades itself the map's resolution shows:
+    differences over a small step are noisier than gradients there, and agree with the gradients' mean over a motion of some
+    texels. Raises ValueError for cameras of other forms.
     """
 
     def __init__(self, renderer: Renderer, vertices: Tensor, faces: Tensor, view: Tensor, intrinsics: Tensor,
                  bias: float = 0.005):
         view, intrinsics = torch.as_tensor(view), torch.as_tensor(intrinsics)
-        if tuple(view.shape) != (1, 4, 4) or tuple(intrinsics.shape) not in ((1, 4), (1, 1)):
-            _fail("intrinsics", f"{list(view.shape)} and {list(intrinsics.shape)}", "a view [1, 4, 4], [1, 4] or [1, 1]")
+        if tuple(view.shape) != (1, 4, 4):
+            _fail("view", list(view.shape), "[1, 4, 4]")
+        if tuple(intrinsics.shape) not in ((1, 4), (1, 1)):
+            _fail("intrinsics", list(intrinsics.shape), "[1, 4], or [1, 1] of an orthographic camera")
         self._view, self._intrinsics, self._size = view[0], intrinsics[0], (renderer.height, renderer.width)
         samples = renderer.rasterize(vertices, faces, view, intrinsics)
         seen = samples.depth.detach()[samples.mask]
