@@ -185,6 +185,16 @@ DPR_API void dpr_mesh_file_destroy(dpr_mesh_file* file);
 DPR_API dpr_status dpr_mesh_file_write(const char* path, const dpr_array* arrays, size_t count,
                                        const char* const* settings, size_t setting_count);
 
+/* An image of a file: dpr/image.hpp has the formats and their errors. `encoding` of files of 8 or 16 bits: "srgb" (NULL),
+ * which becomes linear, or "linear", which is taken as it is. */
+typedef struct dpr_image_file dpr_image_file;
+DPR_API dpr_status dpr_image_file_read(const char* path, const char* encoding, dpr_image_file** file);
+/* DPR_FLOAT32 [height, width, 4], linear RGB and alpha, row 0 on top. Valid until the file is destroyed, and not to be
+ * written to. */
+DPR_API dpr_status dpr_image_file_pixels(const dpr_image_file* file, dpr_array* pixels);
+DPR_API void dpr_image_file_destroy(dpr_image_file* file);
+DPR_API dpr_status dpr_image_file_write(const char* path, const char* encoding, const dpr_array* pixels);
+
 #ifdef __cplusplus
 }
 #endif

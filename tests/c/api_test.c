@@ -779,6 +779,28 @@ static void test_mesh_files(void) {
   EXPECT(remove(path) == 0);
 }
 
+static void test_image_files(void) {
+  static const char* const path = "c_api_image.exr";
+  float pixels[2 * 3 * 4];
+  const dpr_array given = {"pixels", pixels, DPR_FLOAT32, 3, {2, 3, 4}};
+  const dpr_array wrong = {"pixels", pixels, DPR_FLOAT32, 3, {2, 4, 3}};
+  dpr_array found;
+  dpr_image_file* file = NULL;
+  int i;
+  for (i = 0; i < 24; ++i) pixels[i] = (float)i / 16;
+  REFUSED(dpr_image_file_write(path, NULL, &wrong), "pixels");
+  REFUSED(dpr_image_file_write(path, "gamma", &given), "encoding");
+  EXPECT(dpr_image_file_read(path, NULL, &file) == DPR_IO_ERROR && file == NULL);
+  OK(dpr_image_file_write(path, NULL, &given));
+  OK(dpr_image_file_read(path, "linear", &file));
+  REFUSED(dpr_image_file_pixels(file, NULL), "pixels");
+  OK(dpr_image_file_pixels(file, &found));
+  EXPECT(found.shape[0] == 2 && found.shape[1] == 3 && memcmp(found.data, pixels, sizeof pixels) == 0);
+  dpr_image_file_destroy(file);
+  REFUSED(dpr_image_file_pixels(file, &found), "file");
+  EXPECT(remove(path) == 0);
+}
+
 /* A frame of named arrays: <u, J v> = <J^T u, v> of two directions at once, and tangents that are refused. */
 static void test_frame_tangents(void) {
   static float pixels[FLOATS], tangents[2 * FLOATS], weights[FLOATS], texels[3] = {1, 1, 1};
@@ -1542,6 +1564,7 @@ int main(void) {
   test_cameras(device);
   test_frame_tangents();
   test_mesh_files();
+  test_image_files();
   test_frame_samples();
   test_setters(device);
   test_mesh_loss(device, scene);

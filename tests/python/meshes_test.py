@@ -1,4 +1,4 @@
-"""Files of meshes and losses of shapes in the Python package `dpr`."""
+"""Files of meshes and images, and losses of shapes, in the Python package `dpr`."""
 import os
 import pathlib
 import tempfile
@@ -66,6 +66,27 @@ class FilesTest(unittest.TestCase):
         np.testing.assert_allclose(mesh["materials"]["specular"], [[0.5] * 3])
         with self.assertWarnsRegex(UserWarning, "without materials"):
             dpr.write_mesh(self.folder / "mesh.glb", **mesh)
+
+    def test_images_go_through_files(self):
+        image = np.random.default_rng(0).random((5, 7, 4), np.float32)
+        dpr.write_image(self.folder / "image.exr", image)
+        np.testing.assert_array_equal(dpr.read_image(self.folder / "image.exr"), image)
+        dpr.write_image(self.folder / "image.png", image[..., :3].tolist())
+        found = dpr.read_image(str(self.folder / "image.png"))
+        np.testing.assert_allclose(found[..., :3], image[..., :3], atol=0.005)
+        self.assertTrue((found[..., 3] == 1).all())
+        raw = dpr.read_image(self.folder / "image.png", encoding="linear")[..., :3]
+        np.testing.assert_allclose(np.where(raw <= 0.04045, raw / 12.92, ((raw + 0.055) / 1.055) ** 2.4), found[..., :3],
+                                   atol=1e-5)
+        (self.folder / "cut.png").write_bytes((self.folder / "image.png").read_bytes()[:60])
+        for file, pixels, message in (("cut.png", None, "cut.png"), ("none.png", None, "none.png"), ("a.txt", image, "txt"),
+                                      ("a.png", image[..., :2], r"\[5, 7, 2\]"), ("no/a.png", image, "no/a.png"),
+                                      ("a.png", image[:0], "pixels")):
+            with self.subTest(file=file, message=message), self.assertRaisesRegex((dpr.Error, ValueError), message):
+                dpr.read_image(self.folder / file) if pixels is None else dpr.write_image(self.folder / file, pixels)
+        with self.assertRaisesRegex(ValueError, "srgb or linear"):
+            dpr.read_image(self.folder / "image.png", encoding="gamma")
+        self.assertEqual(len(list(self.folder.iterdir())), 3)
 
     def test_errors_leave_no_file(self):
         vertices, faces = octahedron()

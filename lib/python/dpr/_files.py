@@ -1,4 +1,4 @@
-"""Files of meshes."""
+"""Files of meshes and images."""
 import ctypes
 import os
 import warnings
@@ -87,3 +87,35 @@ def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Arr
     words = [(name, [value] if isinstance(value, str) else list(value)) for name, value in (("wrap", wrap), ("filter", filter))]
     settings = [f"{name}={','.join(value)}" for name, value in words] if textures else []
     _library.call("dpr_mesh_file_write", os.fsencode(file), *_frames.c_arrays(packed), *_frames.words(settings))
+
+
+def read_image(file: Union[str, "os.PathLike[str]"], *, encoding: str = "srgb") -> Array:
+    """Pixels of an image: NumPy's float32 [H, W, 4], linear RGB and alpha, row 0 on top; alpha 1 where the file has none.
+
+    encoding  of files of 8 or 16 bits: "srgb", which becomes linear, or "linear", which is taken as it is (normal maps)
+
+    EXR, PNG, JPEG and what else OpenImageIO knows; read_image(file)[..., :3] is a texture, and with [None] in front what
+    render() returns. Raises OSError (dpr.IoError) where the file is missing, malformed or not finite.
+    """
+    handle = ctypes.c_void_p()
+    _library.call("dpr_image_file_read", os.fsencode(file), encoding.encode(), ctypes.byref(handle))
+    try:
+        pixels = _library.Array()
+        _library.call("dpr_image_file_pixels", handle, ctypes.byref(pixels))
+        return _copied(pixels)
+    finally:
+        _library.library.dpr_image_file_destroy(handle)
+
+
+def write_image(file: Union[str, "os.PathLike[str]"], pixels: Array, *, encoding: str = "srgb") -> None:
+    """Writes linear RGB [H, W, 3], or with alpha [H, W, 4], by the extension, whole or not at all: .exr keeps the floats;
+    .png, .tif, .tga, .jpg, .bmp and .ppm clamp to [0, 1] and have 8 bits, encoded as read_image() has it. Viewers blend
+    by alpha what render() has blended already: give them image[0, ..., :3]. Raises OSError (dpr.IoError) where the file
+    cannot be written, ValueError for another shape."""
+    pixels = _arrays.to_numpy(_arrays.converted("pixels", _arrays.from_numbers(pixels), False, "dpr.write_image"))
+    if pixels.ndim != 3 or pixels.shape[-1] not in (3, 4):
+        _arrays.fail(ValueError, "pixels", list(pixels.shape), "[H, W, 3] or [H, W, 4]", "dpr.write_image")
+    if pixels.shape[-1] == 3:
+        pixels = np.concatenate([pixels, np.ones_like(pixels[..., :1])], -1)
+    pixels = np.ascontiguousarray(pixels)
+    _library.call("dpr_image_file_write", os.fsencode(file), encoding.encode(), _frames.c_arrays([("pixels", pixels)])[0])
