@@ -7,6 +7,7 @@
 #include "dpr/image.hpp"
 #include "learn/npz.hpp"
 #include "mesh/mesh_reader.hpp"
+#include "scene/opencv_camera.hpp"
 #include "scene/scene_json.hpp"
 #include "solve/shape_state.hpp"
 #include "solve/shape_views.hpp"
@@ -66,6 +67,8 @@ void read_scene_text(std::string_view content) {
   parse_scene(folder() / "scene.json", content, notes);
 }
 
+void read_camera_text(std::string_view content) { parse_opencv_camera(folder() / "camera.yml", content); }
+
 void read_views_text(std::string_view content) {
   Notes notes;
   parse_views(folder() / "views.json", content, notes);
@@ -90,7 +93,7 @@ void read_npz_bytes(std::string_view content) {
   if (again.shape != read.shape || again.values != read.values) throw std::logic_error("other values");
 }
 
-constexpr std::array<Target, 11> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
+constexpr std::array<Target, 12> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>},
                                             {"mesh_ply", read_mesh_bytes<k_ply>},
                                             {"mesh_off", read_mesh_bytes<k_off>},
                                             {"mesh_stl", read_mesh_bytes<k_stl>},
@@ -98,6 +101,7 @@ constexpr std::array<Target, 11> k_targets{{{"mesh_obj", read_mesh_bytes<k_obj>}
                                             {"materials", read_materials},
                                             {"image", read_image_bytes},
                                             {"scene", read_scene_text},
+                                            {"opencv_camera", read_camera_text},
                                             {"views", read_views_text},
                                             {"npz", read_npz_bytes},
                                             {"shape_checkpoint", read_shape_checkpoint}}};
