@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <variant>
 #include <vector>
@@ -44,6 +45,11 @@ struct PoseObservation {
   float weight = 1;  ///< >= 0: factor on the weight that is found from the residuals
 };
 
+/// A rectangle of an image, pixels, from the corner of the top-left one.
+struct PoseBox {
+  float x = 0, y = 0, width = 0, height = 0;
+};
+
 /// Many hypotheses at once, from coarse to fine, each by Levenberg-Marquardt (Marquardt 1963) on the
 /// difference between render and target, with exact Jacobians (forward mode). The default: it finds poses from
 /// anywhere. It brings a smoothing of its own, the exact joint composition with a blur that follows the pixels;
@@ -72,6 +78,10 @@ struct LeastSquares {
   PoseLight light = PoseLight::harmonics;
   /// Weight of every pixel, in [0, 1], in its first channel; of the target's size. Empty: 1.
   Image mask;
+  /// Where the object is seen in the target, about. Pixels further away than a quarter of the larger side, and two
+  /// pixels, are not compared. With a translation to look for, hypotheses other than the initial poses begin at the
+  /// place from which the object fills the box. Perspective cameras only.
+  std::optional<PoseBox> box{};
 
   // Observations, any of which will do without the others, and without colours. The squared residuals of each kind
   // count by their inverse variance, 1 for colours or else the first of these that there is, from the residuals that
@@ -173,7 +183,7 @@ class DPR_API PoseSolver {
 
   /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has not
   /// exactly one mesh, its transform is singular, the sizes of target, mask, silhouette or depth differ from the
-  /// scene's, one of these says nothing, or an option is out of its range.
+  /// scene's, one of these says nothing, the box holds nothing of the image, or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
@@ -185,7 +195,10 @@ class DPR_API PoseSolver {
   PoseResult solve(const Pose& initial, const Callback& callback = {}) const;
   /// From several initial poses at once (at least one). LeastSquares only.
   PoseResult solve(std::span<const Pose> initial, const Callback& callback = {}) const;
-  /// From an unknown rotation; the translation starts from the scene's. LeastSquares with rotations only.
+  /// From an unknown rotation. With a translation to look for the place is unknown too: hypotheses begin where the
+  /// object fills the box; without one, where it fills the silhouette; or else at places all over the picture, from half
+  /// to twice the distance of the scene's, and where it fills a mask that leaves out some of the picture. Without a
+  /// translation to look for it is the scene's. LeastSquares with rotations only.
   PoseResult search(const Callback& callback = {}) const;
 
  private:

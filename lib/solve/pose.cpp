@@ -11,6 +11,7 @@
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_descent.hpp"
+#include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/pose_search.hpp"
 
@@ -70,10 +71,7 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
           "a value other than 0");
 }
 
-Pose PoseSolver::scene_pose() const {
-  const glm::dmat4 transform(scene_.meshes.front().transform);
-  return {polar_decomposition(glm::dmat3(transform)).rotation, glm::dvec3(transform[3])};
-}
+Pose PoseSolver::scene_pose() const { return pose_of(scene_); }
 
 unsigned PoseSolver::most_iterations() const {
   if (const auto* descent = std::get_if<Descent>(&options_.method)) return descent->iterations;

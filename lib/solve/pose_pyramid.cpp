@@ -7,6 +7,7 @@
 
 #include "base/checks.hpp"
 #include "solve/levenberg_marquardt.hpp"
+#include "solve/pose_window.hpp"
 
 namespace dpr {
 
@@ -80,6 +81,7 @@ void validate(const LeastSquares& options, const Scene& scene) {
   };
   validate_factor(options.silhouette.weight, "silhouette_weight (pose)");
   validate_factor(options.depth.weight, "depth_weight (pose)");
+  if (options.box) validate_box(*options.box, scene);
 }
 
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {

@@ -7,12 +7,12 @@
 #include <iterator>
 #include <optional>
 
-#include "mesh/bounding_box.hpp"
-#include "solve/polar.hpp"
 #include "solve/pose_candidates.hpp"
+#include "solve/pose_pivot.hpp"
+#include "solve/pose_places.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/pose_scatter.hpp"
-#include "solve/rotation_grid.hpp"
+#include "solve/pose_window.hpp"
 
 namespace dpr {
 namespace {
@@ -36,7 +36,7 @@ constexpr std::size_t k_turned = 4;
 class Fit {
  public:
   Fit(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-      std::span<const Pose> initial, const PoseSolver::Callback& callback)
+      std::span<const Pose> initial, const PosePlaces& places, const PoseSolver::Callback& callback)
       : device_(device),
         scene_(scene),
         target_(target),
@@ -46,7 +46,8 @@ class Fit {
         callback_(callback),
         beam_(method_.robust ? k_robust_beam : k_beam),
         initial_(initial.begin(), initial.end()),
-        space_(scene, initial.front(), options),
+        places_(places),
+        space_(scene, places.about(), options),
         half_turns_(half_turns(scene.meshes.front())) {}
 
   PoseResult run(bool anywhere);
@@ -70,7 +71,6 @@ class Fit {
   void rescale(PoseLevel& level);
   void set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
   std::vector<Hypothesis> hypotheses() const { return hypotheses_of(candidates_); }
-  std::vector<Hypothesis> grid(std::size_t rotations) const;
   /// Refines all candidates at a level and keeps the best distinct ones.
   void work(PoseLevel& level, std::size_t keep);
   void turn(PoseLevel& level, Turns turns);
@@ -92,6 +92,7 @@ class Fit {
   const PoseSolver::Callback& callback_;
   const Beam& beam_;
   std::vector<Pose> initial_;
+  const PosePlaces& places_;
   PoseSpace space_;
   std::array<glm::dmat3, 3> half_turns_;
   PoseLight light_ = PoseLight::fixed;  // tried at present
@@ -104,7 +105,7 @@ class Fit {
 
 PoseResult Fit::run(bool anywhere) {
   result_.start = initial_.front();
-  const std::vector<LevelShape> shapes = level_shapes(scene_, method_);
+  const std::vector<LevelShape> shapes = places_.shapes(level_shapes(scene_, method_), space_);
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
     light_ = light_wanted_;
     descend(shapes, *found);
@@ -259,30 +260,16 @@ void Fit::rescale(PoseLevel& level) {
   if (level.has_observations()) wrong_ = wrong_loss(level);
 }
 
-/// At the initial translation.
-std::vector<Hypothesis> Fit::grid(std::size_t rotations) const {
-  std::vector<Hypothesis> result;
-  for (const glm::dmat3& rotation : rotation_grid(rotations)) {
-    result.push_back({{rotation, initial_.front().translation}});
-  }
-  return result;
-}
-
-/// The initial poses, and the best of the grid.
+/// The initial poses, and the best of the grid and of other places.
 void Fit::start(PoseLevel& level) {
   constexpr std::size_t k_enough = 144;  // to know the scale
-  std::vector<Hypothesis> some = grid(std::min<std::size_t>(method_.rotations, k_enough));
+  std::vector<Hypothesis> some = places_.grid(std::min<std::size_t>(method_.rotations, k_enough));
   for (const Pose& pose : initial_) some.push_back({pose});
   set_scales(level, some);
   wrong_ = wrong_loss(level);
-  const std::vector<Hypothesis> grid = this->grid(method_.rotations);
-  const std::vector<double> losses = level.losses(grid);
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    candidates_.push_back({grid[i]});
-    candidates_.back().equations.loss = losses[i];
-  }
-  std::ranges::stable_sort(candidates_, by_loss);
-  candidates_.resize(std::min(candidates_.size(), beam_.front()));
+  candidates_ = least_losses(level, places_.grid(method_.rotations), beam_.front());
+  for (const PlaceGroup& group : places_.others(level, method_.rotations))
+    std::ranges::copy(least_losses(level, group.hypotheses, group.keep), std::back_inserter(candidates_));
   for (const Pose& pose : initial_) candidates_.push_back({{pose}});
   candidates_[candidates_.size() - initial_.size()].is_initial = true;
 }
@@ -358,41 +345,44 @@ void Fit::choose_equals(bool anywhere) {
 /// Loss of a pose that explains nothing: the median over rotations.
 double Fit::wrong_loss(PoseLevel& level) const {
   constexpr std::size_t k_enough = 15;  // the finest level's renders are dear
-  std::vector<double> losses = level.losses(grid(k_enough));
+  std::vector<double> losses = level.losses(places_.grid(k_enough));
   std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
   return losses[losses.size() / 2];
+}
+
+PoseResult fit_about_middle(const Device& device, const Scene& scene, const Image& target,
+                            const PoseOptions& options, std::span<const Pose> initial, bool anywhere,
+                            const PoseSolver::Callback& callback) {
+  const PosePivot pivot(scene, options.solve_translation);
+  std::vector<Pose> starts;
+  for (const Pose& pose : initial) starts.push_back(pivot.to_middle(pose));
+  PoseSolver::Callback report;
+  if (callback) {
+    report = [&](PoseIteration step) {
+      step.pose = pivot.to_origin(step.pose);
+      return callback(step);
+    };
+  }
+  const PosePlaces places(pivot.scene(), options, starts.front(), anywhere);
+  if (anywhere) starts = {places.about()};
+  PoseResult result = Fit(device, pivot.scene(), target, options, starts, places, report).run(anywhere);
+  pivot.to_origin(result.pose, result.covariance);
+  result.pose = pivot.to_origin(result.pose);
+  result.start = initial.front();
+  for (PoseHypothesis& h : result.equals) h.pose = pivot.to_origin(h.pose);
+  for (PoseIteration& step : result.history) step.pose = pivot.to_origin(step.pose);
+  return result;
 }
 
 }  // namespace
 
 PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {
-  const glm::vec3 middle = center(bounding_box(scene.meshes.front().mesh.positions));
-  if (!options.solve_translation || middle == glm::vec3(0))
-    return Fit(device, scene, target, options, initial, callback).run(anywhere);
-  // A mesh may lie far from its origin, about which a rotation would throw it out of the picture.
-  Scene centered = scene;
-  Instance& object = centered.meshes.front();
-  for (glm::vec3& p : object.mesh.positions) p -= middle;
-  object.transform[3] = object.transform * glm::vec4(middle, 1);
-  const glm::dvec3 arm =
-      polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch * glm::dvec3(middle);
-  const auto to_origin = [&](Pose& pose) { pose.translation -= pose.rotation * arm; };
-  std::vector<Pose> places(initial.begin(), initial.end());
-  for (Pose& pose : places) pose.translation += pose.rotation * arm;
-  PoseSolver::Callback report;
-  if (callback) {
-    report = [&](PoseIteration step) {
-      to_origin(step.pose);
-      return callback(step);
-    };
+  if (const std::optional<PoseBox> box = box_of_search(options, anywhere)) {
+    const PoseProblem part = cut_to_box(scene, target, options, *box);
+    return fit_about_middle(device, part.scene, part.target, part.options, initial, anywhere, callback);
   }
-  PoseResult result = Fit(device, centered, target, options, places, report).run(anywhere);
-  if (!result.covariance.empty()) move_pivot(-(result.pose.rotation * arm), result.covariance);
-  for (Pose* pose : {&result.pose, &result.start}) to_origin(*pose);
-  for (PoseHypothesis& h : result.equals) to_origin(h.pose);
-  for (PoseIteration& step : result.history) to_origin(step.pose);
-  return result;
+  return fit_about_middle(device, scene, target, options, initial, anywhere, callback);
 }
 
 }  // namespace dpr

@@ -86,16 +86,21 @@ Image resample_medians(const Image& image, int width, int height) {
   return result;
 }
 
+Camera in_pixels(Camera camera, int width, int height) {
+  if (camera.intrinsics) return camera;
+  const double focal = 0.5 * height / std::tan(0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees)));
+  camera.intrinsics = Intrinsics{static_cast<float>(focal), static_cast<float>(focal),
+                                 0.5F * static_cast<float>(width), 0.5F * static_cast<float>(height)};
+  return camera;
+}
+
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height) {
   if ((width == new_width && height == new_height) || camera.orthographic_height) return camera;
   // In pixels, whatever the camera was given by: the ratio of the sides may change by rounding.
-  const double focal = 0.5 * height / std::tan(0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees)));
-  Intrinsics k{static_cast<float>(focal), static_cast<float>(focal), 0.5F * static_cast<float>(width),
-               0.5F * static_cast<float>(height)};
-  if (camera.intrinsics) k = *camera.intrinsics;
+  Camera result = in_pixels(camera, width, height);
+  const Intrinsics k = *result.intrinsics;
   const float x = static_cast<float>(new_width) / static_cast<float>(width);
   const float y = static_cast<float>(new_height) / static_cast<float>(height);
-  Camera result = camera;
   result.intrinsics = Intrinsics{k.fx * x, k.fy * y, k.cx * x, k.cy * y};
   return result;
 }

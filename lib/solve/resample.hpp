@@ -17,6 +17,9 @@ Image resample_weighted(Image image, int width, int height);
 /// the part of the area that has. Means would mix what lies before an edge with what lies behind it.
 Image resample_medians(const Image& image, int width, int height);
 
+/// The perspective camera with intrinsics, for images of that size.
+Camera in_pixels(Camera camera, int width, int height);
+
 /// The camera that sees the same picture in images of another size. An orthographic one keeps its height:
 /// where rounding changes the ratio of the sides, it sees a little more or less at the left and right.
 Camera resample(const Camera& camera, int width, int height, int new_width, int new_height);

@@ -1,0 +1,28 @@
+// The part of the images in which an object is looked for.
+#pragma once
+
+#include <optional>
+
+#include "dpr/pose.hpp"
+
+namespace dpr {
+
+/// Throws InvalidArgument for a box that holds nothing of the scene's images.
+void validate_box(const PoseBox& box, const Scene& scene);
+
+/// Bounding box of the pixels whose first channel is above half of the largest; none where all are 0.
+std::optional<PoseBox> extent(const Image& weights);
+
+/// A scene, its target and its observations.
+struct PoseProblem {
+  Scene scene;
+  Image target;
+  PoseOptions options;
+};
+
+/// The problem in the pixels about a box alone: none is further away than a quarter of the larger side of the box. The
+/// box of the options, if there is one, moves along. The camera must be a perspective one.
+PoseProblem cut_to_box(const Scene& scene, const Image& target, const PoseOptions& options,
+                       const PoseBox& box);
+
+}  // namespace dpr

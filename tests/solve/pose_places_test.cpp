@@ -1,0 +1,179 @@
+// Objects whose place is not known: found in a box, in a mask, and anywhere in the picture.
+#include "solve/pose_places.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "dpr/error.hpp"
+#include "solve/polar.hpp"
+#include "solve/pose_window.hpp"
+#include "support/messages.hpp"
+#include "support/reduced.hpp"
+#include "support/rigid_image.hpp"
+
+using namespace dpr;
+
+namespace {
+
+constexpr double k_radius = 1.7320508;  // of the cube
+
+Scene cube_scene() {
+  Scene scene;
+  scene.width = 96;
+  scene.height = 80;
+  scene.camera = orbit_camera(6.7F, 30, 120);
+  scene.camera.intrinsics = Intrinsics{70, 74, 52, 37};
+  scene.meshes.push_back({make_cube(), glm::mat4(1.0F)});
+  return scene;
+}
+
+/// A pose that is seen so many radii to the right, upwards and nearer than the middle of the scene.
+Pose moved(const Scene& scene, const glm::dvec3& radii) {
+  const glm::dmat3 camera_to_world = glm::transpose(glm::dmat3(scene.camera.view));
+  return {rotation_from_vector({1.9, -0.7, 0.8}), camera_to_world * (k_radius * radii)};
+}
+
+Scene with(Scene scene, const Pose& pose) {
+  scene.meshes.front().transform = affine(pose.rotation, pose.translation);
+  return scene;
+}
+
+void check_found(const PoseResult& result, const Pose& truth) {
+  CHECK(result.explained);
+  CHECK(angle_degrees(result.pose.rotation, truth.rotation) < 0.5);
+  CHECK(glm::length(result.pose.translation - truth.translation) < 0.03 * k_radius);
+  CHECK(result.start.translation == glm::dvec3(0.0));
+}
+
+/// 1 at the object's pixels, and within so many columns and rows.
+Image mask_of(const Image& target, int around = 0) {
+  Image mask(target.width, target.height);
+  for (int row = 0; row < mask.height; ++row) {
+    for (int column = 0; column < mask.width; ++column) {
+      if (!(target.at(column, row).w > 0.5F)) continue;
+      for (int y = std::max(row - around, 0); y <= std::min(row + around, mask.height - 1); ++y) {
+        for (int x = std::max(column - around, 0); x <= std::min(column + around, mask.width - 1); ++x)
+          mask.at(x, y) = glm::vec4(1);
+      }
+    }
+  }
+  return mask;
+}
+
+LeastSquares in_box(const PoseBox& box) {
+  LeastSquares method;
+  method.box = box;
+  return method;
+}
+
+/// Larger by so many pixels on every side.
+PoseBox grown(PoseBox box, float by) {
+  return {box.x - by, box.y - by, box.width + 2 * by, box.height + 2 * by};
+}
+
+}  // namespace
+
+TEST_SUITE("unit") {
+  TEST_CASE("from its place in a box an object fills the box, whatever its rotation") {
+    const Scene scene = cube_scene();
+    const PoseBox box{10, 20, 24, 18};
+    const BoxPlaces places(scene, box);
+    for (const glm::dvec3& r : {glm::dvec3(0), glm::dvec3(0.4, 0.9, -0.3), glm::dvec3(2, 0, 1)}) {
+      const glm::dmat3 rotation = rotation_from_vector(r);
+      const glm::dmat4 place(affine(rotation, places.translation(rotation)));
+      glm::dvec2 low(1e9), high(-1e9);
+      for (const glm::vec3& p : scene.meshes.front().mesh.positions) {
+        const glm::dvec3 q(glm::dmat4(scene.camera.view) * place * glm::dvec4(p, 1));
+        const glm::dvec2 pixel(52 + 70 * q.x / -q.z, 37 - 74 * q.y / -q.z);
+        low = glm::min(low, pixel);
+        high = glm::max(high, pixel);
+      }
+      CHECK(glm::length(0.5 * (low + high) - glm::dvec2(22, 29)) < 0.1);
+      CHECK(glm::length(high - low) == doctest::Approx(30).epsilon(0.02));
+    }
+  }
+
+  TEST_CASE("a problem cut to a box shows the same in fewer pixels") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = cube_scene();
+    const Image whole = test::rigid_image(device, scene);
+    const PoseOptions options{.method = in_box({30, 20, 40, 30})};
+    const PoseProblem part = cut_to_box(scene, whole, options, {30, 20, 40, 30});
+    CHECK(part.scene.width == 64);
+    CHECK(part.scene.height == 54);
+    CHECK(std::get<LeastSquares>(part.options.method).box->x == 12);
+    const Image seen = test::rigid_image(device, part.scene);
+    REQUIRE(seen.pixels.size() == part.target.pixels.size());
+    double difference = 0;
+    for (std::size_t i = 0; i < seen.pixels.size(); ++i)
+      difference = std::max(difference, double{glm::length(seen.pixels[i] - part.target.pixels[i])});
+    CHECK(difference < 1e-3);
+    const auto box = extent(mask_of(whole));
+    REQUIRE(box);
+    CHECK(box->width > 20);
+    CHECK_FALSE(extent(Image(3, 3)));
+  }
+}
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("search: an object of unknown place is found in a box, a mask, a silhouette or anywhere") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = cube_scene();
+    for (const glm::dvec3& radii : {glm::dvec3(1.1, 0.3, -1.5), glm::dvec3(-1.6, -0.9, 0.5)}) {
+      CAPTURE(radii.x);
+      const Pose truth = moved(scene, radii);
+      const Image target = test::rigid_image(device, with(scene, truth));
+      const Image mask = mask_of(target);
+      const auto search = [&](const LeastSquares& method) {
+        return PoseSolver(device, scene, target, {.method = method, .solve_translation = true}).search();
+      };
+      LeastSquares masked, outlined;
+      masked.mask = mask_of(target, 3);  // with less the size would not be seen
+      outlined.silhouette.image = mask;
+      for (const LeastSquares& method : {LeastSquares{}, masked, outlined, in_box(grown(*extent(mask), 2))})
+        check_found(search(method), truth);
+    }
+  }
+
+  TEST_CASE("solve: of what lies far outside the box nothing is seen") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = cube_scene();
+    const Pose truth = moved(scene, {1.1, 0.3, -1.5});
+    Image target = test::rigid_image(device, with(scene, truth));
+    const PoseBox box = *extent(mask_of(target));
+    for (int row = 0; row < target.height; ++row) {
+      for (int column = 0; column < target.width; ++column) {
+        const auto x = static_cast<float>(column), y = static_cast<float>(row);
+        const float margin = 0.25F * std::max(box.width, box.height) + 3;
+        const PoseBox seen = grown(box, margin);
+        if (x >= seen.x && x < seen.x + seen.width && y >= seen.y && y < seen.y + seen.height) continue;
+        target.at(column, row) = glm::vec4(column % 2, row % 3, 1, 1);
+      }
+    }
+    const PoseSolver solver(device, scene, target, {.method = in_box(box), .solve_translation = true});
+    check_found(solver.search(), truth);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("boxes without a pixel of the image are refused") {
+    const Device device = open_device();
+    Scene scene = cube_scene();
+    const Image target(96, 80);
+    const auto make = [&](const PoseBox& box) {
+      return PoseSolver(device, scene, target, {.method = in_box(box)});
+    };
+    for (const PoseBox& box : {PoseBox{96, 0, 5, 5}, PoseBox{-5, 0, 5, 5}, PoseBox{0, 0, 0, 5},
+                               PoseBox{0, 0, 5, INFINITY}, PoseBox{NAN, 0, 5, 5}}) {
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, make(box), "box (pose): got ");
+    }
+    scene.camera.intrinsics.reset();
+    scene.camera.orthographic_height = 5.0F;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, make({0, 0, 5, 5}), "box (pose): got an orthographic camera");
+  }
+}
