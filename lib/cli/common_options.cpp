@@ -149,8 +149,8 @@ void print_notes(const Notes& notes, const CommonOptions& options) {
   for (const std::string& note : notes) std::fprintf(stderr, "dpr: note: %s\n", note.c_str());
 }
 
-Scene read_scene(const std::string& file, const CommonOptions& options) {
-  SceneOverrides overrides{.size = {}, .smoothing = smoothing_options(options)};
+Scene read_scene(const std::string& file, const CommonOptions& options, std::optional<glm::ivec2> picture) {
+  SceneOverrides overrides{.size = {}, .smoothing = smoothing_options(options), .picture = picture};
   if (options.size) overrides.size = parse_size(*options.size);
   Notes notes;
   Scene scene = parse_scene(file, read_file(file), notes, overrides);

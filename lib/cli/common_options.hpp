@@ -59,7 +59,9 @@ void apply(const CommonOptions& options, Scene& scene);
 /// Prints what the program leaves out of a file, one line each on stderr; nothing with --quiet.
 void print_notes(const Notes& notes, const CommonOptions& options);
 
-/// The scene that the file describes, with these in the place of its values; and print_notes().
-Scene read_scene(const std::string& file, const CommonOptions& options);
+/// The scene that the file describes, with these in the place of its values; and print_notes(). `picture`: size of
+/// the picture that the scene is compared with (SceneOverrides::picture).
+Scene read_scene(const std::string& file, const CommonOptions& options,
+                 std::optional<glm::ivec2> picture = std::nullopt);
 
 }  // namespace dpr::cli

@@ -3,14 +3,18 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <utility>
 
+#include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
+#include "cli/bop.hpp"
 #include "cli/commands.hpp"
 #include "cli/option_names.hpp"
+#include "cli/picture_camera.hpp"
+#include "cli/pose_pictures.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"
-#include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
 
@@ -25,11 +29,12 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, target, initial_rotation, mask, silhouette, depth,
-      loss = "mse", optimizer = "adam", schedule = "anneal", light = "harmonics", output, report;
-  std::optional<std::string> method;
-  std::optional<float> depth_scale;
-  bool search = false;
+  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
+                                               light = "harmonics", output, report;
+  PosePictureFiles pictures;
+  BopOptions bop;  // no folder: a scene
+  std::optional<std::string> method, box;
+  bool search = false, exif_focal = false;
   PoseOptions solver;
   LeastSquares least_squares;
   Descent descent;
@@ -61,8 +66,6 @@ bool wants_descent(const CLI::App& command, const std::optional<std::string>& me
 
 void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   if (!wants_descent(command, options.method)) {
-    if (!options.mask.empty())
-      options.least_squares.mask = read_image(options.mask, nullptr, Encoding::linear);
     options.least_squares.robust = command.count("--robust") > 0;
     options.least_squares.light = parse_light(options.light);
     options.solver.method = options.least_squares;
@@ -122,51 +125,120 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   }
 }
 
-/// Reads what is compared beside colours; returns the image of these, empty without one.
-Image read_observations(PoseCommandOptions& options, const CommonOptions& common, const Scene& scene) {
-  if (options.depth_scale && options.depth.empty())
-    throw InvalidArgument("--depth-scale (command line)", "no --depth", "the file whose unit it is");
+/// What an image of BOP's brings for options that are not given.
+BopImage begin_bop(const CLI::App& command, PoseCommandOptions& options) {
+  for (const char* const needed : {"--image", "--object"}) {
+    if (command.count(needed) == 0)
+      throw InvalidArgument(std::string(needed) + " (command line)", "none", "its number, beside --bop");
+  }
+  BopImage image = read_bop_image(options.bop);
+  PosePictureFiles& files = options.pictures;
+  if (files.target.empty() && files.silhouette.empty() && files.depth.empty()) files.target = image.picture;
+  if (!files.depth.empty() && !files.depth_scale) files.depth_scale = image.depth_scale;
+  options.solver.solve_translation = true;
+  return image;
+}
+
+bool writes_csv(const PoseCommandOptions& options) { return lower_case_extension(options.output) == ".csv"; }
+
+void check_scene_options(const PoseCommandOptions& options) {
+  if (options.scene.empty() == options.bop.folder.empty()) {
+    throw InvalidArgument("--scene (command line)", options.scene.empty() ? "none" : "one beside --bop",
+                          "a scene file, or a folder of BOP's with --bop");
+  }
+  if (!writes_csv(options)) return;
+  if (options.bop.folder.empty())
+    throw InvalidArgument("--output (command line)", "a .csv without --bop", "a .json file");
+  bop_scene_number(options.bop.folder);
+}
+
+/// The box of --box, which is in pixels of the picture as given, in the scene's.
+PoseBox scaled_box(const std::string& text, glm::ivec2 picture, const Scene& scene) {
+  const glm::vec4 box = parse_box(text, "--box (command line)");
+  const glm::vec2 factor = glm::vec2(scene.width, scene.height) / glm::vec2(picture);
+  return {box.x * factor.x, box.y * factor.y, box.z * factor.x, box.w * factor.y};
+}
+
+/// The scene in the pictures' size, with the camera that took them; the pictures are scaled to its size.
+Scene read_photographed_scene(PoseCommandOptions& options, const std::optional<BopImage>& bop,
+                              const CommonOptions& common, ObservedPictures& pictures) {
+  const glm::ivec2 picture = pictures.size();
+  Notes notes;
+  Scene scene;
+  if (bop) {
+    scene = bop_scene(options.bop, *bop, picture, !options.search, notes);
+    apply(common, scene);
+  } else {
+    scene = read_scene(options.scene, common, picture);
+  }
+  if (!options.camera.empty()) take_opencv_camera(scene, options.camera, picture);
+  if (options.exif_focal) take_exif_focal(scene, pictures.focal_35mm, options.pictures.target, notes);
+  scale_pictures(pictures, options.pictures, scene, notes);
+  print_notes(notes, common);
+  if (options.box)
+    std::get<LeastSquares>(options.solver.method).box = scaled_box(*options.box, picture, scene);
+  return scene;
+}
+
+/// Hands what is compared beside colours to the method, and returns the image of colours, empty without one.
+Image observe(ObservedPictures pictures, PoseCommandOptions& options) {
   if (auto* method = std::get_if<LeastSquares>(&options.solver.method)) {
-    if (!options.silhouette.empty()) method->silhouette.image = read_silhouette(options.silhouette, scene);
-    if (!options.depth.empty()) method->depth.image = read_depth(options.depth, options.depth_scale, scene);
+    method->mask = std::move(pictures.mask);
+    method->silhouette.image = std::move(pictures.silhouette);
+    method->depth.image = std::move(pictures.depth);
+    options.least_squares = *method;
   }
-  if (!options.target.empty())
-    return read_target(options.target, options.descent.loss, common.encoding(), scene);
-  if (options.silhouette.empty() && options.depth.empty()) {
-    throw InvalidArgument("--target (command line)", "none",
-                          "an image that shows the pose, or --silhouette, or --depth");
-  }
-  if (!options.report.empty())
+  if (pictures.target.pixels.empty() && !options.report.empty())
     throw InvalidArgument("--report (command line)", "no --target", "one, which it shows beside the result");
-  return {};
+  return std::move(pictures.target);
+}
+
+void print_reference(const PoseResult& result, const std::optional<Pose>& truth) {
+  if (!truth) return;
+  std::printf("scene_gt.json: %.3f degrees, %.3f mm away\n",
+              angle_degrees(result.pose.rotation, truth->rotation),
+              glm::length(result.pose.translation - truth->translation));
 }
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // The outputs are checked before the work.
   require_writable(options.output);
+  check_scene_options(options);
   std::optional<glm::dmat3> rotation;
   if (!options.initial_rotation.empty()) {
     rotation =
         rotation_from_vector(parse_vector(options.initial_rotation, "--initial-rotation (command line)"));
   }
+  std::optional<BopImage> bop;
+  if (!options.bop.folder.empty()) bop = begin_bop(command, options);
+  const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
   choose_method(command, options);
-  const Scene scene = read_scene(options.scene, common);
-  const Image target = read_observations(options, common, scene);
+  ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
+  const Scene scene = read_photographed_scene(options, bop, common, pictures);
+  const Image target = observe(std::move(pictures), options);
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
   });
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
-  Json json = pose_to_json(scene, result);
-  add_light(json, device, scene, target, result, options.least_squares);
-  write_json(options.output, json);
-  if (!options.report.empty()) {
-    const std::string title = "The pose of " + std::filesystem::path(options.scene).filename().string();
-    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, target, result,
-                      common.quiet);
+  const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
+  if (writes_csv(options)) {
+    write_bop_result(options.output, options.bop, result);
+  } else {
+    Json json = pose_to_json(scene, result, true_rotation);
+    add_light(json, device, scene, target, result, options.least_squares);
+    write_json(options.output, json);
   }
-  if (!common.quiet) print(command, options, result);
+  if (!options.report.empty()) {
+    const std::string& source = bop ? options.bop.folder : options.scene;
+    const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
+    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, target, result,
+                      common.quiet, true_rotation);
+  }
+  if (common.quiet) return;
+  print(command, options, result);
+  print_reference(result, truth);
 }
 
 void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
@@ -195,21 +267,27 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
           "look")
       ->group(k_least_squares_group)
       ->type_name("harmonics|gain|fixed");
-  add("--mask", options.mask,
+  add("--mask", options.pictures.mask,
       "Image whose first channel is the weight of every pixel, in [0, 1], in all comparisons: what lies "
       "outside is not looked at",
       "MASK.png");
-  add("--silhouette", options.silhouette,
+  add("--box", options.box,
+      "Box about the object in the picture, in pixels as given, from its upper left corner: what lies "
+      "further away than "
+      "a quarter of the larger side is not looked at, and with --translation poses are tried that fill the "
+      "box",
+      "X,Y,W,H");
+  add("--silhouette", options.pictures.silhouette,
       "Image of where the object is, 1, and where it is not, 0, which the render's coverage should match: in "
       "its alpha, if that is below 1 anywhere, or else in its first channel. Beside --target, or without",
       "IMAGE");
   add("--silhouette-weight", method.silhouette.weight,
       "Factor on the weight that the residuals give it, their inverse variance; 1 by default", "FLOAT");
-  add("--depth", options.depth,
+  add("--depth", options.pictures.depth,
       "Image whose first channel is the distance along the camera's axis, as --aov depth of dpr render "
       "writes it; 0 or NaN where it is not known. Beside --target, or without",
       "DEPTH.exr");
-  add("--depth-scale", options.depth_scale,
+  add("--depth-scale", options.pictures.depth_scale,
       "Length of a 1 of that file, in the scene's units: 0.001 for a 16-bit PNG of millimetres and a scene "
       "in metres; files of whole numbers need one",
       "FLOAT");
@@ -222,6 +300,36 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       .add_flag("--distortion", options.solver.solve_distortion,
                 "Look for the lens' k1 and k2 too, from the scene's or none")
       ->group(k_least_squares_group);
+}
+
+void add_bop_options(CLI::App& command, BopOptions& options) {
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    command.add_option(name, value, description)->group("BOP (https://bop.felk.cvut.cz)")->type_name(type);
+  };
+  add("--bop", options.folder,
+      "Folder of a scene of a BOP data set, in place of --scene: camera, picture, model (millimetres) and, "
+      "without "
+      "--search, the start are its files'; the translation is looked for, and P.json or a row of results in "
+      "P.csv is "
+      "written",
+      "DATASET/test/000001");
+  add("--image", options.image, "Number of the image", "N");
+  add("--object", options.object, "Number of the object", "ID");
+  add("--models", options.models, "Folder of the models; DATASET/models by default", "DIR");
+}
+
+void add_camera_options(CLI::App& command, PoseCommandOptions& options) {
+  CLI::Option* camera =
+      command
+          .add_option(
+              "--camera", options.camera,
+              "Camera matrix and distortion, in place of the scene's, as OpenCV's calibration writes them "
+              "(YAML)")
+          ->type_name("CAMERA.yml");
+  command
+      .add_flag("--exif-focal", options.exif_focal,
+                "Focal length as the target's file says (Exif's for 35-mm film), in place of the scene's")
+      ->excludes(camera);
 }
 
 void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
@@ -247,11 +355,15 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand(
       "pose", "Finds the pose of a scene's only mesh from one image, a silhouette or depths");
   const auto options = std::make_shared<PoseCommandOptions>();
-  command->add_option("--scene", options->scene, "Scene file")->required()->type_name("S.json");
+  command->add_option("--scene", options->scene, "Scene file")->type_name("S.json");
   command
-      ->add_option("--target", options->target,
-                   "Image that shows the pose; may be left out with --silhouette or --depth")
+      ->add_option(
+          "--target", options->pictures.target,
+          "Image that shows the pose; may be left out with --silhouette or --depth. Pictures larger than "
+          "the scene are scaled to its size (masks and depths by medians), a scene without width and height "
+          "takes the picture's size")
       ->type_name("T.exr");
+  add_camera_options(*command, *options);
   CLI::Option* initial =
       command
           ->add_option(
@@ -260,13 +372,21 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
               "rotation of the scene's transform); of poses that explain the target equally well the "
               "nearest to it is the result")
           ->type_name("RX,RY,RZ");
-  command->add_flag("--search", options->search, "Nothing is known of the rotation")->excludes(initial);
+  command
+      ->add_flag("--search", options->search,
+                 "Nothing is known of the rotation, nor with --translation of the place: the object may be "
+                 "anywhere in the "
+                 "picture, at half to twice the distance of the scene's, or with --box, --silhouette or "
+                 "--mask where "
+                 "it fills these")
+      ->excludes(initial);
   command->add_flag("--translation", options->solver.solve_translation, "Look for the translation too");
   command->add_option("--method", options->method, "Method that finds the pose; least_squares by default")
       ->type_name("least_squares|descent");
   command->add_option("-o,--output", options->output, "Pose to write")->required()->type_name("P.json");
   command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")
       ->type_name("DIR");
+  add_bop_options(*command, options->bop);
   add_least_squares_options(*command, *options);
   add_descent_options(*command, *options);
   add_common_options(*command, common);

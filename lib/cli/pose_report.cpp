@@ -13,6 +13,7 @@
 #include "cli/plot.hpp"
 #include "cli/pose_page.hpp"
 #include "cli/progress.hpp"
+#include "cli/scene_file.hpp"
 #include "cli/text.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/polar.hpp"
@@ -180,6 +181,9 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
 
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
   Json json = hypothesis_to_json(result, scene);
+  json["width"] = scene.width;
+  json["height"] = scene.height;
+  json["camera"] = camera_with_view(calibrated(scene.camera, result.focal_scale, result.radial));
   json["explained"] = result.explained;
   json["light"] = name_of(result.light);
   json["iterations"] = result.iterations;

@@ -44,6 +44,17 @@ glm::dvec3 parse_vector(const std::string& text, const std::string& argument) {
                         "three finite numbers separated by commas, e.g. 0.1,0,-0.5");
 }
 
+glm::vec4 parse_box(const std::string& text, const std::string& argument) {
+  const char *at = text.data(), *end = at + text.size();
+  glm::dvec4 v(0.0);
+  const bool complete =
+      take(at, end, v.x, ',') && take(at, end, v.y, ',') && take(at, end, v.z, ',') && take(at, end, v.w, 0);
+  const glm::vec4 box(v);
+  if (complete && std::isfinite(box.x + box.y) && std::isfinite(box.z + box.w)) return box;
+  throw InvalidArgument(argument, "\"" + text + "\"",
+                        "X,Y,WIDTH,HEIGHT in pixels from the upper left corner, e.g. 120,80,64,48");
+}
+
 std::uint64_t parse_whole_number(const std::string& text, const std::string& argument) {
   const char *at = text.data(), *end = at + text.size();
   std::uint64_t number = 0;

@@ -22,6 +22,9 @@ glm::ivec2 parse_size(const std::string& text);
 /// Three numbers separated by commas. Throws InvalidArgument; `argument` says which one in the message.
 glm::dvec3 parse_vector(const std::string& text, const std::string& argument);
 
+/// Four numbers separated by commas: x, y, width, height. Throws InvalidArgument.
+glm::vec4 parse_box(const std::string& text, const std::string& argument);
+
 /// A whole number of 64 bits. Throws InvalidArgument; `argument` says which one in the message.
 std::uint64_t parse_whole_number(const std::string& text, const std::string& argument);
 

@@ -153,7 +153,8 @@ Image read(const std::string& file, std::span<const unsigned char> content, Pixe
   const bool floats = spec.format.is_floating_point();
   constexpr int k_bits = 8;  // of a byte
   const float largest = floats ? 1.0F : std::exp2(static_cast<float>(k_bits * spec.format.size())) - 1;
-  facts = {source[3] >= 0, floats, largest};
+  const int focal = spec.get_int_attribute("Exif:FocalLengthIn35mmFilm", 0);
+  facts = {source[3] >= 0, floats, largest, static_cast<float>(std::max(focal, 0))};
   return upright(std::move(image), spec.get_int_attribute("Orientation", 1));
 }
 

@@ -27,6 +27,8 @@ struct PixelFacts {
   bool has_alpha = false;
   bool floats = false;  ///< or else whole numbers, as parts of the largest one
   float largest = 1;    ///< what that is; 1 of floats
+  /// Exif's focal length in mm for a camera of 35-mm film, whose picture has the same diagonal angle of view; 0: unknown.
+  float focal_35mm = 0;
 };
 
 /// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <string>
 
@@ -321,6 +323,13 @@ SmoothingOptions parse_smoothing(const JsonNode& node) {
   return options;
 }
 
+bool have_same_shape(glm::ivec2 a, glm::ivec2 b) {
+  constexpr std::int64_t k_hundred = 100;
+  const std::int64_t across = std::int64_t{a.x} * b.y, down = std::int64_t{b.x} * a.y;
+  const std::int64_t difference = std::abs(across - down);
+  return difference <= std::max(a.x, b.x) && difference * k_hundred <= std::max(across, down);
+}
+
 void resize(Scene& scene, glm::ivec2 size) {
   if (auto& k = scene.camera.intrinsics) {
     const glm::vec2 factor = glm::vec2(size) / glm::vec2(scene.width, scene.height);
@@ -329,6 +338,22 @@ void resize(Scene& scene, glm::ivec2 size) {
   scene.width = size.x;
   scene.height = size.y;
 }
+
+namespace {
+
+/// Intrinsics of a scene without a size are those of the picture.
+void set_size(const JsonNode& node, const SceneOverrides& overrides, Scene& scene) {
+  const auto& picture = overrides.picture;
+  if (picture && !node.find("width") && !node.find("height")) {
+    scene.width = picture->x;
+    scene.height = picture->y;
+  }
+  if (overrides.size) resize(scene, *overrides.size);
+  const glm::ivec2 size(scene.width, scene.height);
+  if (picture && picture->x < size.x && have_same_shape(*picture, size)) resize(scene, *picture);
+}
+
+}  // namespace
 
 void with_keys_of(const std::filesystem::path& file, const SmoothingOptions& smoothing,
                   const SmoothingOptions& overrides, const std::function<void()>& check) {
@@ -349,7 +374,7 @@ Scene parse_scene(const std::filesystem::path& file, std::string_view text, Note
   const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
   Scene scene = parse_scene(node, file.parent_path(), notes);
-  if (overrides.size) resize(scene, *overrides.size);
+  set_size(node, overrides, scene);
   SmoothingOptions smoothing;
   take(node, "smoothing", smoothing, parse_smoothing);
   const std::string note = noise_note(smoothing, overrides.smoothing);

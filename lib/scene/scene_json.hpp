@@ -22,7 +22,13 @@ SmoothingOptions parse_smoothing(const JsonNode& node);
 struct SceneOverrides {
   std::optional<glm::ivec2> size;  ///< pixels
   SmoothingOptions smoothing;
+  /// Size of the picture that the scene is compared with. A scene that gives neither width nor height has that size,
+  /// and a larger scene of the same shape shrinks to that size.
+  std::optional<glm::ivec2> picture = std::nullopt;
 };
+
+/// True if one size is the other scaled, up to a pixel of the smaller one and a hundredth.
+bool have_same_shape(glm::ivec2 a, glm::ivec2 b);
 
 /// Calls `check`. An InvalidArgument that it throws about a field, such as "znear (camera)", names the file and
 /// the key in it instead. A field of the smoothing keeps its name where the overrides decide on it.

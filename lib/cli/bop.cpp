@@ -1,0 +1,152 @@
+#include "cli/bop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "base/checks.hpp"
+#include "base/from_chars.hpp"
+#include "base/json_node.hpp"
+#include "base/output_file.hpp"
+#include "cli/text.hpp"
+#include "dpr/error.hpp"
+#include "dpr/mesh.hpp"
+#include "solve/polar.hpp"
+
+namespace dpr::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string six_digits(std::uint64_t number) {
+  const std::string digits = std::to_string(number);
+  return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+}
+
+std::vector<float> numbers(const JsonNode& node, std::size_t count) {
+  std::vector<float> values;
+  for (const JsonNode& element : node.elements(count)) values.push_back(element.number());
+  return values;
+}
+
+/// Row by row.
+glm::dmat3 matrix(const JsonNode& node) {
+  const std::vector<float> k = numbers(node, 9);
+  glm::dmat3 result;
+  for (int i = 0; i < 9; ++i) result[i % 3][i / 3] = static_cast<double>(k[static_cast<std::size_t>(i)]);
+  return result;
+}
+
+std::string picture_of(const BopOptions& options) {
+  constexpr std::array<const char*, 2> k_folders{"rgb", "gray"};
+  constexpr std::array<const char*, 4> k_extensions{".png", ".jpg", ".tif", ".jpeg"};
+  for (const char* const folder : k_folders) {
+    for (const char* const extension : k_extensions) {
+      const fs::path file = fs::path(options.folder) / folder / (six_digits(options.image) + extension);
+      std::error_code error;
+      if (fs::exists(file, error)) return file.string();
+    }
+  }
+  throw IoError(fs::path(options.folder) / "rgb" / (six_digits(options.image) + ".png"),
+                "the file does not exist, and none in gray or with another extension (.jpg, .tif)");
+}
+
+Intrinsics intrinsics_of(const JsonNode& node) {
+  const std::vector<float> k = numbers(node, 9);
+  const bool is_pinhole =
+      k[0] > 0 && k[4] > 0 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
+  if (!is_pinhole) node.fail("another matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1], without skew");
+  return from_opencv_intrinsics({k[0], k[4], k[2], k[5]});
+}
+
+Pose truth_of(const JsonNode& objects, std::uint64_t wanted) {
+  std::string others;
+  for (const JsonNode& object : objects.elements()) {
+    const std::uint64_t number = object.at("obj_id").whole_number(std::numeric_limits<std::uint32_t>::max());
+    if (number != wanted) {
+      others += (others.empty() ? "" : ", ") + std::to_string(number);
+      continue;
+    }
+    const glm::dmat3 rotation = matrix(object.at("cam_R_m2c"));
+    if (!(glm::determinant(rotation) > 0)) object.at("cam_R_m2c").fail("no rotation", "a rotation matrix");
+    const std::vector<float> t = numbers(object.at("cam_t_m2c"), 3);
+    return {polar_decomposition(rotation).rotation, glm::dvec3(t[0], t[1], t[2])};
+  }
+  objects.fail("no object " + std::to_string(wanted), others.empty() ? "an image of it" : "one of " + others);
+}
+
+/// The model, about whose origin all vertices are within the radius.
+Mesh read_model(const BopOptions& options, Notes& notes, double& radius) {
+  const fs::path data = fs::absolute(fs::path(options.folder) / "").lexically_normal().parent_path();
+  const fs::path models =
+      options.models.empty() ? data.parent_path().parent_path() / "models" : fs::path(options.models);
+  Mesh mesh = read_mesh(models / ("obj_" + six_digits(options.object) + ".ply"), notes);
+  radius = 0;
+  for (const glm::vec3& p : mesh.positions) radius = std::max(radius, glm::length(glm::dvec3(p)));
+  return mesh;
+}
+
+}  // namespace
+
+BopImage read_bop_image(const BopOptions& options) {
+  const std::string key = std::to_string(options.image);
+  const fs::path folder(options.folder), camera_file = folder / "scene_camera.json";
+  const nlohmann::json cameras = read_json(camera_file);
+  const JsonNode camera = JsonNode(cameras, camera_file).at(key);
+  BopImage image{picture_of(options), 1, intrinsics_of(camera.at("cam_K")), {}};
+  if (const auto scale = camera.find("depth_scale")) image.depth_scale = scale->number();
+  const fs::path truth_file = folder / "scene_gt.json";
+  std::error_code error;
+  if (!fs::exists(truth_file, error)) return image;
+  const nlohmann::json truths = read_json(truth_file);
+  image.truth = truth_of(JsonNode(truths, truth_file).at(key), options.object);
+  return image;
+}
+
+Scene bop_scene(const BopOptions& options, const BopImage& image, glm::ivec2 size, bool starts_true,
+                Notes& notes) {
+  constexpr double k_part = 0.5;  // of the image's short side, which an object in front of the camera fills
+  constexpr double k_nearest = 0.1, k_furthest = 100;  // radii
+  Scene scene;
+  scene.width = size.x;
+  scene.height = size.y;
+  scene.camera.view = from_opencv_view(glm::mat4(1.0F));
+  scene.camera.intrinsics = image.intrinsics;
+  double radius = 0;
+  Mesh mesh = read_model(options, notes, radius);
+  const double short_side = std::min(size.x, size.y), focal = static_cast<double>(image.intrinsics.fy);
+  Pose start{glm::dmat3(1.0), {0, 0, 2 * radius * focal / (k_part * short_side)}};
+  if (starts_true && image.truth) start = *image.truth;
+  scene.camera.znear = static_cast<float>(k_nearest * radius);
+  scene.camera.zfar = static_cast<float>(std::max(k_furthest * radius, 4 * start.translation.z));
+  scene.meshes.push_back({std::move(mesh), affine(start.rotation, start.translation)});
+  return scene;
+}
+
+std::uint64_t bop_scene_number(const std::string& folder) {
+  const std::string name =
+      fs::absolute(fs::path(folder) / "").lexically_normal().parent_path().filename().string();
+  std::uint64_t number = 0;
+  const char *const begin = name.data(), *const end = begin + name.size();
+  if (from_chars(begin, end, number).ptr == end && !name.empty()) return number;
+  throw InvalidArgument("--bop (command line)", "the folder name \"" + name + "\"",
+                        "the number of a scene, such as 000001, for a result in CSV");
+}
+
+void write_bop_result(const fs::path& file, const BopOptions& options, const PoseResult& result) {
+  std::string rotation, translation;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column)
+      rotation += (rotation.empty() ? "" : " ") + checks::text(result.pose.rotation[column][row]);
+    translation += (translation.empty() ? "" : " ") + checks::text(result.pose.translation[row]);
+  }
+  write_whole_file(file, "scene_id,im_id,obj_id,score,R,t,time\n" +
+                             std::to_string(bop_scene_number(options.folder)) + "," +
+                             std::to_string(options.image) + "," + std::to_string(options.object) + "," +
+                             (result.explained ? "1" : "0") + "," + rotation + "," + translation + "," +
+                             checks::text(result.seconds) + "\n");
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,141 @@
+// dpr pose --bop: a data set in BOP's form, made of a picture by dpr, is read back and solved.
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+
+#include "dpr/mesh.hpp"
+#include "dpr/pose.hpp"
+#include "support/command.hpp"
+#include "support/messages.hpp"
+
+namespace {
+
+using dpr::test::contains;
+using dpr::test::is_skipped;
+using dpr::test::Outcome;
+using dpr::test::TempDir;
+using nlohmann::json;
+
+Outcome run(const TempDir& folder, const std::string& arguments) {
+  std::istringstream words(arguments);
+  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
+}
+
+/// From object to camera in OpenCV's axes: x right, y down, z forward; millimetres.
+const dpr::Pose k_truth{dpr::rotation_from_vector({0.6, -1.1, 0.4}), {60, -45, 620}};
+
+json rows(const glm::dmat3& matrix) {
+  json list;
+  for (int i = 0; i < 9; ++i) list.push_back(matrix[i % 3][i / 3]);
+  return list;
+}
+
+/// data/models/obj_000005.ply, and of the scene data/test/000002 the image 3 with the objects 1 and 5.
+void write_data(const TempDir& folder) {
+  std::filesystem::create_directories(folder / "data/models");
+  std::filesystem::create_directories(folder / "data/test/000002/rgb");
+  dpr::Mesh cube = dpr::make_cube();
+  for (glm::vec3& p : cube.positions) p = 70.0F * p + glm::vec3(12, -8, 20);
+  dpr::write_mesh(folder / "data/models/obj_000005.ply", cube);
+  // dpr's own scene of it: OpenGL's axes, the camera at the world's origin, pixels from the first one's corner.
+  const glm::dmat3 flip(1, 0, 0, 0, -1, 0, 0, 0, -1), turn = flip * k_truth.rotation;
+  const glm::dvec3 place = flip * k_truth.translation;
+  json transform;
+  for (int row = 0; row < 3; ++row)
+    transform.push_back({turn[0][row], turn[1][row], turn[2][row], place[row]});
+  transform.push_back({0, 0, 0, 1});
+  const json scene{
+      {"width", 160},
+      {"height", 120},
+      {"camera", {{"intrinsics", {{"fx", 210}, {"fy", 205}, {"cx", 76.5}, {"cy", 64.5}}}, {"zfar", 2000}}},
+      {"meshes", {{{"file", "data/models/obj_000005.ply"}, {"transform", transform}}}}};
+  folder.write("own.json", scene.dump());
+  REQUIRE(run(folder, "render --scene own.json --preset rigid -o data/test/000002/rgb/000003.png --quiet")
+              .status == 0);
+  // Pixels from the first one's centre.
+  const json camera{{"3", {{"cam_K", {210, 0, 76, 0, 205, 64, 0, 0, 1}}, {"depth_scale", 0.1}}}};
+  folder.write("data/test/000002/scene_camera.json", camera.dump());
+  const auto object = [](int number, const dpr::Pose& pose) {
+    const glm::dvec3& t = pose.translation;
+    return json{{"cam_R_m2c", rows(pose.rotation)}, {"cam_t_m2c", {t.x, t.y, t.z}}, {"obj_id", number}};
+  };
+  folder.write("data/test/000002/scene_gt.json", json{{"3", {object(1, {}), object(5, k_truth)}}}.dump());
+}
+
+const std::string k_image = "pose --bop data/test/000002 --image 3 --object 5 --quiet ";
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("dpr pose --bop: the pose of a data set in BOP's form is found again, and written as BOP's row") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_data(folder);
+    const glm::dvec3 start =
+        dpr::vector_from_rotation(dpr::rotation_from_vector({0.1, 0.15, -0.1}) * k_truth.rotation);
+    std::ostringstream vector;
+    vector << start.x << "," << start.y << "," << start.z;
+    REQUIRE(
+        run(folder, k_image + "--rotations 0 --initial-rotation " + vector.str() + " -o pose.json").status ==
+        0);
+    const json pose = json::parse(folder.read("pose.json"));
+    CHECK(pose["explained"] == true);
+    CHECK(pose["angle_error_degrees"]["start"].get<double>() > 8);
+    CHECK(pose["angle_error_degrees"]["end"].get<double>() < 0.1);
+    for (int i = 0; i < 3; ++i) {
+      const double found = pose["translation"][static_cast<std::size_t>(i)].get<double>();
+      CHECK(std::abs(found - k_truth.translation[i]) < 2e-3 * k_truth.translation.z);
+    }
+
+    // Without the reference, from a detector's box.
+    std::filesystem::remove(folder / "data/test/000002/scene_gt.json");
+    REQUIRE(run(folder, k_image + "--search --box 55,10,90,90 -o result.csv").status == 0);
+    std::istringstream lines(folder.read("result.csv"));
+    std::string head, field;
+    std::getline(lines, head);
+    CHECK(head == "scene_id,im_id,obj_id,score,R,t,time");
+    std::vector<std::string> fields;
+    while (std::getline(lines, field, ',')) fields.push_back(field);
+    REQUIRE(fields.size() == 7);
+    CHECK(fields[0] + "," + fields[1] + "," + fields[2] + "," + fields[3] == "2,3,5,1");
+    std::istringstream numbers(fields[4] + " " + fields[5]);
+    glm::dmat3 rotation;
+    glm::dvec3 translation;
+    for (int i = 0; i < 9; ++i) numbers >> rotation[i % 3][i / 3];
+    for (int i = 0; i < 3; ++i) numbers >> translation[i];
+    CHECK(dpr::angle_degrees(rotation, k_truth.rotation) < 0.1);
+    CHECK(glm::length(translation - k_truth.translation) < 2e-3 * k_truth.translation.z);
+  }
+}
+
+TEST_SUITE("robustness") {
+  TEST_CASE("dpr pose --bop: what the files do not have is an error that names the place") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_data(folder);
+    const auto check = [&](const std::string& options, const char* says) {
+      CAPTURE(options);
+      const Outcome outcome = run(folder, "pose --quiet " + options);
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, says));
+    };
+    check("-o p.json --target t.png", "--scene (command line): got none");
+    check("--bop data/test/000002 --image 3 -o p.json", "--object (command line): got none");
+    check("--bop data/test/000002 --image 4 --object 5 -o p.json", "scene_camera.json): got no key \"4\"");
+    check("--bop data/test/000002 --image 3 --object 2 -o p.json", "got no object 2, expected one of 1, 5");
+    check("--bop data/test --image 3 --object 5 -o p.csv", "the folder name \"test\"");
+    check("--scene own.json --target t.png -o p.csv", "a .csv without --bop");
+    check("--bop data/test/000002 --image 3 --object 5 --models data -o p.json", "obj_000005.ply");
+    folder.write("data/test/000002/scene_camera.json", R"({"3": {"cam_K": [1, 2, 3, 0, 1, 0, 0, 0, 1]}})");
+    check("--bop data/test/000002 --image 3 --object 5 -o p.json",
+          "3.cam_K (data/test/000002/scene_camera.json)");
+  }
+}
