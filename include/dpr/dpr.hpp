@@ -23,6 +23,7 @@
 #include "dpr/optimizer.hpp"
 #include "dpr/photographs.hpp"
 #include "dpr/pose.hpp"
+#include "dpr/pose_tracker.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/sampling_error.hpp"
 #include "dpr/scene.hpp"

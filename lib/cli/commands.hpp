@@ -13,6 +13,7 @@ void add_info_command(CLI::App& application, CommonOptions& common);
 void add_render_command(CLI::App& application, CommonOptions& common);
 void add_gradient_command(CLI::App& application, CommonOptions& common);
 void add_pose_command(CLI::App& application, CommonOptions& common);
+void add_track_command(CLI::App& application, CommonOptions& common);
 void add_fit_command(CLI::App& application, CommonOptions& common);
 /// These hand over to the programs dpr-learn and dpr-bench beside this one.
 void add_learn_command(CLI::App& application);

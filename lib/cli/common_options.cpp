@@ -95,11 +95,15 @@ void allow_several_devices(CLI::App& command) {
           "(default: DPR_DEVICE, else one GPU, else an accelerator, else a CPU)");
 }
 
-void add_common_options(CLI::App& command, CommonOptions& options) {
+void add_image_options(CLI::App& command, CommonOptions& options) {
   add_output_options(command, options);
   add_device_options(command, options);
   command.add_option("--size", options.size, "Size of the image in pixels")->type_name("WxH");
   command.add_flag("--linear", options.linear, "Files of 8 and 16 bits hold linear colours instead of sRGB");
+}
+
+void add_common_options(CLI::App& command, CommonOptions& options) {
+  add_image_options(command, options);
   add_seed_option(
       command, [&](std::uint64_t seed) { options.seed = seed; }, "Seed of everything random");
   add_smoothing_options(command, options.smoothing);

@@ -44,6 +44,8 @@ void add_device_options(CLI::App& command, CommonOptions& options);
 void allow_several_devices(CLI::App& command);
 /// --verbose and --quiet.
 void add_output_options(CLI::App& command, CommonOptions& options);
+/// Those, --size and --linear: of a command that brings its own smoothing and draws nothing at random.
+void add_image_options(CLI::App& command, CommonOptions& options);
 /// Those, and all that a command that renders understands.
 void add_common_options(CLI::App& command, CommonOptions& options);
 

@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   dpr::cli::add_render_command(application, common);
   dpr::cli::add_gradient_command(application, common);
   dpr::cli::add_pose_command(application, common);
+  dpr::cli::add_track_command(application, common);
   dpr::cli::add_fit_command(application, common);
   dpr::cli::add_learn_command(application);
   dpr::cli::add_bench_command(application);

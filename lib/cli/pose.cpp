@@ -12,6 +12,7 @@
 #include "cli/commands.hpp"
 #include "cli/option_names.hpp"
 #include "cli/picture_camera.hpp"
+#include "cli/pose_options.hpp"
 #include "cli/pose_pictures.hpp"
 #include "cli/pose_report.hpp"
 #include "cli/provenance.hpp"
@@ -29,20 +30,16 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
-                                               light = "harmonics", output, report;
+  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
+                                               report;
   PosePictureFiles pictures;
   BopOptions bop;  // no folder: a scene
   std::optional<std::string> method, box;
   bool search = false, exif_focal = false;
   PoseOptions solver;
-  LeastSquares least_squares;
+  LeastSquaresOptions least_squares;
   Descent descent;
 };
-
-PoseLight parse_light(const std::string& word) {
-  return static_cast<PoseLight>(position_of(word, light_names(), "--light (command line)"));
-}
 
 OptimizerKind parse_optimizer(const std::string& word) {
   static constexpr std::array<std::string_view, 2> names{"adam", "sgd"};
@@ -66,9 +63,7 @@ bool wants_descent(const CLI::App& command, const std::optional<std::string>& me
 
 void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   if (!wants_descent(command, options.method)) {
-    options.least_squares.robust = command.count("--robust") > 0;
-    options.least_squares.light = parse_light(options.light);
-    options.solver.method = options.least_squares;
+    options.solver.method = options.least_squares.method = read_least_squares(command, options.least_squares);
     return;
   }
   if (options.search || gives_any(command, k_least_squares_group)) {
@@ -107,7 +102,7 @@ std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
   add("--focal", "an unknown focal length");
   add("--distortion", "a lens");
   add("--robust", "is for clutter and occlusion");
-  if (options.light == name_of(PoseLight::fixed))
+  if (options.least_squares.light == name_of(PoseLight::fixed))
     text += (text.empty() ? "" : "; ") + std::string("--light harmonics for another light");
   return text.empty() ? "" : ": " + text;
 }
@@ -186,7 +181,7 @@ Image observe(ObservedPictures pictures, PoseCommandOptions& options) {
     method->mask = std::move(pictures.mask);
     method->silhouette.image = std::move(pictures.silhouette);
     method->depth.image = std::move(pictures.depth);
-    options.least_squares = *method;
+    options.least_squares.method = *method;
   }
   if (pictures.target.pixels.empty() && !options.report.empty())
     throw InvalidArgument("--report (command line)", "no --target", "one, which it shows beside the result");
@@ -213,6 +208,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   if (!options.bop.folder.empty()) bop = begin_bop(command, options);
   const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
   choose_method(command, options);
+  options.pictures.mask = options.least_squares.mask;
   ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
@@ -227,7 +223,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
     write_bop_result(options.output, options.bop, result);
   } else {
     Json json = pose_to_json(scene, result, true_rotation);
-    add_light(json, device, scene, target, result, options.least_squares);
+    add_light(json, device, scene, target, result, options.least_squares.method);
     write_json(options.output, json);
   }
   if (!options.report.empty()) {
@@ -241,36 +237,14 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   print_reference(result, truth);
 }
 
+/// Those that are a single image's beside the shared ones.
 void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
-  LeastSquares& method = options.least_squares;
+  add_least_squares_options(command, k_least_squares_group, options.least_squares);
+  LeastSquares& method = options.least_squares.method;
   const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
     return command.add_option(name, value, description)->group(k_least_squares_group)->type_name(type);
   };
-  add("--rotations", method.rotations,
-      "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
-  add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
-  add("--level-iterations", method.iterations,
-      "Steps a level, more while the best pose still improves; 10 by default", "N");
-  add("--blur", method.blur, "Blur of the edges, in pixels of the level; 0.25 by default", "FLOAT");
-  add("--blur-end", method.blur_end, "The same at the very end; 0.1 by default", "FLOAT");
-  add("--robust", method.robust_scale,
-      "Weighs pixels of other colours (clutter, occlusion) hardly at all; a number is the colour difference "
-      "from which on, else the residuals tell",
-      "[FLOAT]")
-      ->expected(0, 1);
-  command
-      .add_option(
-          "--light", options.light,
-          "Light of the target: harmonics, by default, finds any distant light, gain one that differs in "
-          "colour "
-          "and brightness alone, where the scene's own light does not explain the target; fixed does not "
-          "look")
-      ->group(k_least_squares_group)
-      ->type_name("harmonics|gain|fixed");
-  add("--mask", options.pictures.mask,
-      "Image whose first channel is the weight of every pixel, in [0, 1], in all comparisons: what lies "
-      "outside is not looked at",
-      "MASK.png");
+  add("--blur-end", method.blur_end, "The blur at the very end; 0.1 by default", "FLOAT");
   add("--box", options.box,
       "Box about the object in the picture, in pixels as given, from its upper left corner: what lies "
       "further away than "

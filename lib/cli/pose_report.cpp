@@ -118,20 +118,6 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
                {"Smoothing", "scale", true, {sigma, gamma}}});
 }
 
-Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
-  const Pose& pose = hypothesis.pose;
-  Json json{
-      {"rotation_matrix", rows_to_json(pose.rotation)},
-      {"rotation", to_json(vector_from_rotation(pose.rotation))},
-      {"translation", to_json(pose.translation)},
-      {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch_of(scene), pose.translation)))},
-      {"focal_scale", hypothesis.focal_scale},
-      {"loss", hypothesis.loss}};
-  if (const auto& d = calibrated(scene.camera, 1, hypothesis.radial).distortion)
-    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
-  return json;
-}
-
 Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
   const Smoothing& smoothing = step.smoothing;
   Json entry{{"iteration", step.iteration},
@@ -145,18 +131,6 @@ Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3
              {"hypotheses", step.hypotheses}};
   if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
   return entry;
-}
-
-/// A list of rows.
-Json covariance_to_json(const std::vector<double>& covariance) {
-  const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
-  Json rows = Json::array();
-  for (std::size_t i = 0; i < size; ++i) {
-    rows.push_back(
-        Json(std::vector<double>(covariance.begin() + static_cast<std::ptrdiff_t>(i * size),
-                                 covariance.begin() + static_cast<std::ptrdiff_t>((i + 1) * size))));
-  }
-  return rows;
 }
 
 }  // namespace
@@ -177,6 +151,31 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
                                       step.hypotheses, step.loss));
     return true;
   };
+}
+
+Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
+  const Pose& pose = hypothesis.pose;
+  Json json{
+      {"rotation_matrix", rows_to_json(pose.rotation)},
+      {"rotation", to_json(vector_from_rotation(pose.rotation))},
+      {"translation", to_json(pose.translation)},
+      {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch_of(scene), pose.translation)))},
+      {"focal_scale", hypothesis.focal_scale},
+      {"loss", hypothesis.loss}};
+  if (const auto& d = calibrated(scene.camera, 1, hypothesis.radial).distortion)
+    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  return json;
+}
+
+Json covariance_to_json(const std::vector<double>& covariance) {
+  const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(covariance.size()))));
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < size; ++i) {
+    rows.push_back(
+        Json(std::vector<double>(covariance.begin() + static_cast<std::ptrdiff_t>(i * size),
+                                 covariance.begin() + static_cast<std::ptrdiff_t>((i + 1) * size))));
+  }
+  return rows;
 }
 
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {

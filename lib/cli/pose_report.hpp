@@ -23,6 +23,10 @@ std::string name_of(PoseLight light);
 /// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 
+/// A pose with its parts, as pose.json has it, of the scene's only mesh.
+Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene);
+/// A list of rows.
+Json covariance_to_json(const std::vector<double>& covariance);
 /// pose.json, of a fit to the scene's only mesh. With the true rotation, the angle errors too.
 Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
 

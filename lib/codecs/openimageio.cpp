@@ -86,11 +86,11 @@ bool read_rows(OIIO::ImageInput& input, int begin, int end, std::vector<float>& 
                 static_cast<std::size_t>(spec.nchannels));
   const int top = spec.y + begin, bottom = spec.y + end;
   if (spec.tile_height == 0) {
-    return input.read_scanlines(0, 0, top, bottom, spec.z, 0, spec.nchannels, OIIO::TypeDesc::FLOAT,
-                                values.data());
+    return input.read_scanlines(input.current_subimage(), 0, top, bottom, spec.z, 0, spec.nchannels,
+                                OIIO::TypeDesc::FLOAT, values.data());
   }
-  return input.read_tiles(0, 0, spec.x, spec.x + spec.width, top, bottom, spec.z, spec.z + 1, 0,
-                          spec.nchannels, OIIO::TypeDesc::FLOAT, values.data());
+  return input.read_tiles(input.current_subimage(), 0, spec.x, spec.x + spec.width, top, bottom, spec.z,
+                          spec.z + 1, 0, spec.nchannels, OIIO::TypeDesc::FLOAT, values.data());
 }
 
 /// Appends the pixels of some rows; what their file does not have is one.
@@ -123,11 +123,9 @@ Image upright(Image stored, int orientation) {
   return image;
 }
 
-Image read(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts) {
-  OIIO::Filesystem::IOMemReader reader(const_cast<unsigned char*>(content.data()),
-                                       content.size());  // read only
-  const auto input = open(file, content.empty() ? nullptr : &reader);
-  const OIIO::ImageSpec& spec = input->spec();
+/// The image at which the file is open.
+Image read(OIIO::ImageInput& input, PixelFacts& facts) {
+  const OIIO::ImageSpec& spec = input.spec();
   if (spec.width < 1 || spec.height < 1 || spec.width > checks::k_largest_side ||
       spec.height > checks::k_largest_side || spec.depth > 1 || spec.nchannels < 1) {
     throw std::runtime_error("got " + checks::size(spec.width, spec.height) + " pixels in " +
@@ -144,12 +142,12 @@ Image read(const std::string& file, std::span<const unsigned char> content, Pixe
   const int rows = spec.tile_height > 0 ? spec.tile_height : k_rows;
   std::vector<float> values;
   for (int row = 0; row < spec.height; row += rows) {
-    if (!read_rows(*input, row, std::min(row + rows, spec.height), values))
-      throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
+    if (!read_rows(input, row, std::min(row + rows, spec.height), values))
+      throw std::runtime_error("cannot be read: " + one_line(input.geterror()));
     append_pixels(values, static_cast<std::size_t>(spec.nchannels), source, image.pixels);
   }
   // A JPEG file that ends too soon is read to its end, grey below, and is an error by its message alone.
-  if (input->has_error()) throw std::runtime_error("cannot be read: " + one_line(input->geterror()));
+  if (input.has_error()) throw std::runtime_error("cannot be read: " + one_line(input.geterror()));
   const bool floats = spec.format.is_floating_point();
   constexpr int k_bits = 8;  // of a byte
   const float largest = floats ? 1.0F : std::exp2(static_cast<float>(k_bits * spec.format.size())) - 1;
@@ -158,7 +156,33 @@ Image read(const std::string& file, std::span<const unsigned char> content, Pixe
   return upright(std::move(image), spec.get_int_attribute("Orientation", 1));
 }
 
-constexpr ImageCodec k_codec{read, encode};
+Image read(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts) {
+  OIIO::Filesystem::IOMemReader reader(const_cast<unsigned char*>(content.data()),
+                                       content.size());  // read only
+  const auto input = open(file, content.empty() ? nullptr : &reader);
+  return read(*input, facts);
+}
+
+/// OpenImageIO has the frames of a video as images of one file.
+class Frames final : public StoredImages {
+ public:
+  explicit Frames(const std::string& file) : input_(open(file, nullptr)) {}
+
+  bool next(Image& image, PixelFacts& facts) override {
+    if (!input_->seek_subimage(number_, 0)) return false;
+    ++number_;
+    image = read(*input_, facts);
+    return true;
+  }
+
+ private:
+  std::unique_ptr<OIIO::ImageInput> input_;
+  int number_ = 0;
+};
+
+std::unique_ptr<StoredImages> read_all(const std::string& file) { return std::make_unique<Frames>(file); }
+
+constexpr ImageCodec k_codec{read, encode, read_all};
 
 }  // namespace
 }  // namespace dpr

@@ -36,7 +36,7 @@ std::vector<unsigned char> encode(const Image& image, const PixelFormat& format)
   return file;
 }
 
-constexpr ImageCodec k_codec{nullptr, encode};
+constexpr ImageCodec k_codec{nullptr, encode, nullptr};
 
 }  // namespace
 }  // namespace dpr

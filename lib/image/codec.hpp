@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,6 +32,14 @@ struct PixelFacts {
   float focal_35mm = 0;
 };
 
+/// Images of a file that holds several: those of a video, as they are stored.
+class StoredImages {
+ public:
+  virtual ~StoredImages() = default;
+  /// The next one; false behind the last. Throws std::runtime_error with the reason.
+  virtual bool next(Image& image, PixelFacts& facts) = 0;
+};
+
 /// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module
 /// that only writes.
 struct ImageCodec {
@@ -39,6 +48,8 @@ struct ImageCodec {
   Image (*read)(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts);
   /// The content of a file of a valid image, in memory.
   std::vector<unsigned char> (*encode)(const Image& image, const PixelFormat& format);
+  /// Null in a module that only writes.
+  std::unique_ptr<StoredImages> (*read_all)(const std::string& file);
 };
 
 /// The function by which a module names its codec.
@@ -53,6 +64,21 @@ Texture decode_texture(const std::string& name, std::string_view content);
 
 /// The content of a PNG file of the texture, as write_texture() writes it; an IoError names that file.
 std::string encode_texture(const std::filesystem::path& file, const Texture& texture);
+
+/// Images of a video, one after the other, as the public read_image() has them.
+class Video {
+ public:
+  /// Throws IoError, also where the installed OpenImageIO reads no videos.
+  Video(std::filesystem::path file, Encoding encoding);
+
+  /// The next one; false behind the last. Throws IoError.
+  bool next(Image& image);
+
+ private:
+  std::filesystem::path file_;
+  Encoding encoding_;
+  std::unique_ptr<StoredImages> images_;
+};
 
 /// The pixels as they are stored, finite or not. Throws IoError.
 Image read_pixels(const std::filesystem::path& file, PixelFacts& facts);

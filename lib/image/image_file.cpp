@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
@@ -93,15 +94,19 @@ Image read_stored(const std::filesystem::path& name, const std::string& file,
   }
 }
 
-/// The same, finite and linear.
-Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
-           Encoding encoding, PixelFacts& facts) {
-  Image image = read_stored(name, file, content, facts);
+/// Finite, or an IoError, and decoded.
+Image linear(const std::filesystem::path& name, Image image, Encoding encoding, const PixelFacts& facts) {
   require_finite(name, image);
   if (encoding == Encoding::srgb && !facts.floats) {
     for (glm::vec4& pixel : image.pixels) pixel = transferred(pixel, decode_srgb);
   }
   return image;
+}
+
+/// As read_stored(), finite and linear.
+Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
+           Encoding encoding, PixelFacts& facts) {
+  return linear(name, read_stored(name, file, content, facts), encoding, facts);
 }
 
 Texture texture_of(const Image& image) {
@@ -128,6 +133,26 @@ Image read_pixels(const std::filesystem::path& file, PixelFacts& facts) {
 Image read_image(const std::filesystem::path& file, Encoding encoding, PixelFacts& facts) {
   require_file(file);
   return read(file, file.string(), {}, encoding, facts);
+}
+
+Video::Video(std::filesystem::path file, Encoding encoding) : file_(std::move(file)), encoding_(encoding) {
+  require_file(file_);
+  try {
+    images_ = openimageio().read_all(file_.string());
+  } catch (const std::runtime_error& error) {
+    throw IoError(file_, error.what());
+  }
+}
+
+bool Video::next(Image& image) {
+  PixelFacts facts;
+  try {
+    if (!images_->next(image, facts)) return false;
+  } catch (const std::runtime_error& error) {
+    throw IoError(file_, error.what());
+  }
+  image = linear(file_, std::move(image), encoding_, facts);
+  return true;
 }
 
 Texture read_texture(const std::filesystem::path& file) { return texture_of(read_image(file)); }

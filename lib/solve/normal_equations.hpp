@@ -80,6 +80,9 @@ class NormalSums {
   /// `directions`: number of parameters of a hypothesis.
   NormalSums(const Device& device, const WeighedTarget& target, PoseLight light, std::size_t directions);
 
+  /// Other colours, as many; their weights stay.
+  void set_target(const std::vector<cl_float4>& colors) { target_.upload(impl_of(device_), colors); }
+
   /// Losses of every view.
   std::vector<double> losses(const HypothesisImages& images, const LossScales& scales);
   std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,

@@ -93,15 +93,16 @@ PoseResult PoseSolver::solve(std::span<const Pose> initial, const Callback& call
     require_rotation(pose.rotation);
     poses.push_back({polar_decomposition(pose.rotation).rotation, pose.translation});
   }
-  return timed([&] { return fit_pose(device_, scene_, target_, options_, poses, false, callback); });
+  return timed([&] { return fit_pose(device_, scene_, target_, options_, poses, false, callback).result; });
 }
 
 PoseResult PoseSolver::search(const Callback& callback) const {
   const LeastSquares& method = require_least_squares(options_, "search (pose)");
   require(method.rotations > 0, "rotations (pose search)", method.rotations, "at least 1");
   const Pose pose = scene_pose();
-  return timed(
-      [&] { return fit_pose(device_, scene_, target_, options_, std::span(&pose, 1), true, callback); });
+  return timed([&] {
+    return fit_pose(device_, scene_, target_, options_, std::span(&pose, 1), true, callback).result;
+  });
 }
 
 }  // namespace dpr

@@ -82,8 +82,7 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
   const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
                                                  : resample(options.mask, width(), height());
   if (counts_colors_) {
-    for (const glm::vec4& p : resample(target, width(), height()).pixels)
-      target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+    resample_colors(target);
     for (const glm::vec4& p : mask.pixels) target_.weights.push_back(p.x);
   } else {
     target_.colors.resize(mask.pixels.size());
@@ -91,6 +90,17 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
   }
   if (dpr::has_observations(options)) target_.measured = measured(options, mask);
   sums_.emplace(device, target_, light, space.size());
+}
+
+void PoseLevel::resample_colors(const Image& target) {
+  target_.colors.clear();
+  for (const glm::vec4& p : resample(target, width(), height()).pixels)
+    target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+}
+
+void PoseLevel::set_target(const Image& target) {
+  resample_colors(target);
+  sums_->set_target(target_.colors);
 }
 
 std::vector<cl_float4> PoseLevel::measured(const LeastSquares& options, const Image& mask) const {

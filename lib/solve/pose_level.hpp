@@ -24,6 +24,9 @@ class PoseLevel {
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
             const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals);
 
+  /// Another target of the same size, where colours count. Nothing is allocated on the device.
+  void set_target(const Image& target);
+
   /// The loss of every hypothesis (NormalSums).
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
   /// The same with derivatives.
@@ -69,6 +72,8 @@ class PoseLevel {
   /// Images of views, pixels being means over their samples.
   const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
   const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
+  /// The target's colours at the level's size.
+  void resample_colors(const Image& target);
   /// What was observed beside colours, at the level's size.
   std::vector<cl_float4> measured(const LeastSquares& options, const Image& mask) const;
   HypothesisImages render(std::span<const Hypothesis> hypotheses);

@@ -153,19 +153,6 @@ PosePlaces::PosePlaces(const Scene& scene, const PoseOptions& options, const Pos
   about_.translation = middle->pose.translation;
 }
 
-std::vector<Candidate> least_losses(PoseLevel& level, std::span<const Hypothesis> hypotheses,
-                                    std::size_t count) {
-  const std::vector<double> losses = level.losses(hypotheses);
-  std::vector<Candidate> candidates;
-  for (std::size_t i = 0; i < losses.size(); ++i) {
-    candidates.push_back({hypotheses[i]});
-    candidates.back().equations.loss = losses[i];
-  }
-  std::ranges::stable_sort(candidates, by_loss);
-  candidates.resize(std::min(candidates.size(), count));
-  return candidates;
-}
-
 std::vector<LevelShape> PosePlaces::shapes(std::vector<LevelShape> shapes, const PoseSpace& space) const {
   constexpr double k_least_radius = 3;  // pixels
   while (scans_ && shapes.size() > 2 && space.radius_ndc() * shapes.front().short_side < 2 * k_least_radius)

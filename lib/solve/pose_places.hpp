@@ -37,10 +37,6 @@ struct PlaceGroup {
   std::size_t keep = 0;
 };
 
-/// The hypotheses that leave least at a level, the best first; not linearized.
-std::vector<Candidate> least_losses(PoseLevel& level, std::span<const Hypothesis> hypotheses,
-                                    std::size_t count);
-
 /// Where the hypotheses of a fit begin.
 class PosePlaces {
  public:

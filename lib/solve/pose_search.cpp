@@ -7,30 +7,19 @@
 #include <iterator>
 #include <optional>
 
-#include "solve/pose_candidates.hpp"
+#include "solve/pose_beam.hpp"
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_places.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_scatter.hpp"
 #include "solve/pose_window.hpp"
 
 namespace dpr {
 namespace {
 
-// Numbers of hypotheses that are turned at the coarsest level and at each one after it; the last holds for
-// all further. A robust loss says little of a pose until details show: more must stay.
-using Beam = std::array<std::size_t, 4>;
-constexpr Beam k_beam{96, 24, 12, 8}, k_robust_beam{192, 96, 32, 8};
-// Hypotheses that move the object's rim by less than this against each other are one.
-constexpr double k_same_pixels = 0.5;
-// Losses that differ by no more than this part of what a wrong pose leaves tell no pose from another: the
-// pixels' grid makes that much of one pose or its symmetric twin.
-constexpr double k_equal_losses = 1e-3;
-// The last level changes little.
-constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};
-
 // Number of the best hypotheses, each in a light of its own, that are tried after half a turn too.
 constexpr std::size_t k_turned = 4;
+// Rotations by which it is known what a wrong pose leaves: the finest level's renders are dear.
+constexpr std::size_t k_wrong = 15;
 
 /// One fit at work: the candidates on their way through the levels.
 class Fit {
@@ -44,13 +33,13 @@ class Fit {
         method_(std::get<LeastSquares>(options.method)),
         light_wanted_(target.pixels.empty() ? PoseLight::fixed : method_.light),
         callback_(callback),
-        beam_(method_.robust ? k_robust_beam : k_beam),
+        beam_(beam_of(method_)),
         initial_(initial.begin(), initial.end()),
         places_(places),
         space_(scene, places.about(), options),
         half_turns_(half_turns(scene.meshes.front())) {}
 
-  PoseResult run(bool anywhere);
+  FittedPose run(bool anywhere);
 
  private:
   void start(PoseLevel& level);
@@ -61,7 +50,6 @@ class Fit {
   };
 
   std::optional<Found> descend(const std::vector<LevelShape>& shapes, const Found& found);
-  void add_half_turns(std::size_t count);
   void add_others(PoseLevel& level, const std::vector<Candidate>& found);
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
   void choose_normals(const LevelShape& shape);
@@ -71,16 +59,13 @@ class Fit {
   void rescale(PoseLevel& level);
   void set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
   std::vector<Hypothesis> hypotheses() const { return hypotheses_of(candidates_); }
+  double wrong_loss(PoseLevel& level) const { return dpr::wrong_loss(level, places_.grid(k_wrong)); }
   /// Refines all candidates at a level and keeps the best distinct ones.
   void work(PoseLevel& level, std::size_t keep);
-  void turn(PoseLevel& level, Turns turns);
-  void keep_distinct(const PoseLevel& level, std::size_t count);
-  void drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope);
   void try_half_turns(PoseLevel& level);
-  double enough_to_equal() const;
+  double enough() const { return enough_to_equal(candidates_.front().equations.loss, wrong_); }
   void finish(PoseLevel& level, bool anywhere);
   void choose_equals(bool anywhere);
-  double wrong_loss(PoseLevel& level) const;
   bool report(const PoseLevel& level);
 
   const Device& device_;
@@ -103,7 +88,7 @@ class Fit {
   PoseResult result_;
 };
 
-PoseResult Fit::run(bool anywhere) {
+FittedPose Fit::run(bool anywhere) {
   result_.start = initial_.front();
   const std::vector<LevelShape> shapes = places_.shapes(level_shapes(scene_, method_), space_);
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
@@ -113,21 +98,20 @@ PoseResult Fit::run(bool anywhere) {
   }
   PoseLevel level = make_level(final_shape(shapes.back()), light_);
   rescale(level);
-  drop_hopeless_at(level, 0, k_last_hope);
+  drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
   if (anywhere) try_half_turns(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scales(level.scales());
   wrong_ = wrong_loss(sampled);
-  const bool is_doubted = anywhere && is_doubtful(candidates_, space_, enough_to_equal());
+  const bool is_doubted = anywhere && is_doubtful(candidates_, space_, enough());
   finish(level, anywhere);
-  const double unexplained = std::min(wrong_, sampled.blank_loss());
-  // A robust loss of what is wrong grows with its area alone, no longer with its size.
+  const double blank = sampled.blank_loss(), unexplained = std::min(wrong_, blank);
   const bool is_robust = method_.robust || (target_.pixels.empty() && !method_.depth.image.pixels.empty());
-  const auto part = static_cast<double>(is_robust ? std::sqrt(options_.explained) : options_.explained);
-  result_.explained = result_.loss < part * unexplained && !is_doubted;
-  return result_;
+  result_.explained =
+      result_.loss < explained_part(options_.explained, is_robust) * unexplained && !is_doubted;
+  return {std::move(result_), normals_, level.scales().color, blank > 0 ? unexplained / blank : 1};
 }
 
 /// Through all levels but the last; `found` come in again where they were given up. Returns what was found if
@@ -143,7 +127,7 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
     if (i == 0) start(level);
     if (i > 0) rescale(level);
     if (i > 0 && light_ != PoseLight::fixed) add_others(level, i == found.level ? found.candidates : none);
-    work(level, beam_[std::min(i + 1, beam_.size() - 1)]);
+    work(level, most_at(beam_, i + 1));
     if (!goes_on_ || light_ != PoseLight::fixed || light_wanted_ == PoseLight::fixed) continue;
     constexpr float k_better = 0.7F;
     if (is_finest ? light_gain(level, shapes[i]) < k_better : i > 0 && is_unexplained(level, shapes[i]))
@@ -156,28 +140,16 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
 /// many objects look much the same then, and coarse images in unknown light do not tell the two apart.
 void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
   const std::size_t own = candidates_.size();
-  add_half_turns(method_.rotations > 0 ? std::min(own, k_turned) : 0);
+  add_half_turns(candidates_, half_turns_, method_.rotations > 0 ? std::min(own, k_turned) : 0);
   candidates_.insert(candidates_.end(), found.begin(), found.end());
-  drop_hopeless_at(level, own, k_hope);
-}
-
-/// Of the best `count`.
-void Fit::add_half_turns(std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) {
-    for (const glm::dmat3& turn : half_turns_) {
-      Candidate turned = candidates_[i];
-      turned.hypothesis.pose.rotation *= turn;
-      turned.is_initial = false;
-      candidates_.push_back(turned);
-    }
-  }
+  drop_hopeless_at(level, candidates_, own, k_hope, wrong_);
 }
 
 /// The best pose after half a turn about each axis, refined where it explains anything.
 void Fit::try_half_turns(PoseLevel& level) {
   const std::size_t own = candidates_.size();
-  add_half_turns(1);
-  drop_hopeless_at(level, own, k_hope);
+  add_half_turns(candidates_, half_turns_, 1);
+  drop_hopeless_at(level, candidates_, own, k_hope, wrong_);
   if (candidates_.size() > own) work(level, beam_.back());
 }
 
@@ -242,16 +214,7 @@ LevelShape Fit::final_shape(LevelShape shape) const {
 void Fit::set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const {
   level.weigh_observations(hypotheses);
   if (!method_.robust || target_.pixels.empty()) return;
-  if (method_.robust_scale > 0) {
-    level.set_color_scale(method_.robust_scale);
-  } else {
-    // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
-    // residuals of wrong hypotheses have it, clutter would count.
-    constexpr float k_least_robust_scale = 0.1F, k_most_robust_scale = 0.12F;
-    level.estimate_scale(hypotheses);
-    const float scale = level.scales().color;
-    if (scale > 0) level.set_color_scale(std::clamp(scale, k_least_robust_scale, k_most_robust_scale));
-  }
+  set_robust_scale(level, method_, hypotheses);
 }
 
 /// By the candidates. Losses in which observations have other weights are others.
@@ -275,30 +238,10 @@ void Fit::start(PoseLevel& level) {
 }
 
 void Fit::work(PoseLevel& level, std::size_t keep) {
-  constexpr unsigned k_few = 4;  // within which many come to the same pose, or to none
-  const unsigned enough = method_.iterations, few = std::min(k_few, enough);
-  for (Candidate& candidate : candidates_) candidate.restart();
-  turn(level, {few, few});
-  keep_distinct(level, candidates_.size());
-  if (enough > few) turn(level, {enough - few, k_patience * enough - few});
-  keep_distinct(level, keep);
-}
-
-void Fit::turn(PoseLevel& level, Turns turns) {
-  if (!goes_on_) turns = {0, 0};  // stopped: only judged at this level
-  goes_on_ = refine(level, space_, candidates_, turns, [&] { return report(level); }) && goes_on_;
-}
-
-void Fit::keep_distinct(const PoseLevel& level, std::size_t count) {
-  candidates_ = distinct(std::move(candidates_), space_, k_same_pixels * level.pixel_ndc(), count);
-  drop_hopeless(candidates_, 0, k_hope, wrong_);
-}
-
-/// By what they leave at a level, as they are.
-void Fit::drop_hopeless_at(PoseLevel& level, std::size_t first, const Hope& hope) {
-  const std::vector<double> losses = level.losses(hypotheses());
-  for (std::size_t i = 0; i < losses.size(); ++i) candidates_[i].equations.loss = losses[i];
-  drop_hopeless(candidates_, first, hope, wrong_);
+  const unsigned iterations = goes_on_ ? method_.iterations : 0;  // stopped: only judged at this level
+  goes_on_ = refine_distinct(level, space_, candidates_, {iterations, keep, wrong_},
+                             [&] { return report(level); }) &&
+             goes_on_;
 }
 
 bool Fit::report(const PoseLevel& level) {
@@ -313,24 +256,14 @@ bool Fit::report(const PoseLevel& level) {
 void Fit::finish(PoseLevel& level, bool anywhere) {
   choose_equals(anywhere);
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
-  const ScoreCells cells = level.score_cells(candidates_.front().hypothesis);
-  NormalEquations equations = cells.equations;
-  equations.scatter = score_scatter(cells, space_.size(), level.scales().color);
-  result_.covariance = covariance(equations, space_.size());
-  if (!result_.covariance.empty()) result_.covariance = space_.to_world(result_.covariance);
+  result_.covariance = pose_covariance(level, space_, candidates_.front().hypothesis);
   result_.light = light_;
-}
-
-/// The largest loss that tells a pose from the best no more.
-double Fit::enough_to_equal() const {
-  const double best = candidates_.front().equations.loss;
-  return best + k_equal_losses * std::max(wrong_ - best, 0.0);
 }
 
 /// The poses that explain the target as well as the best, the one to return first.
 void Fit::choose_equals(bool anywhere) {
-  const double enough = enough_to_equal();
-  std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > enough; });
+  const double most = enough();
+  std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > most; });
   if (!anywhere) {
     const Hypothesis first{initial_.front()};
     std::ranges::stable_sort(candidates_, {},
@@ -342,15 +275,7 @@ void Fit::choose_equals(bool anywhere) {
   }
 }
 
-/// Loss of a pose that explains nothing: the median over rotations.
-double Fit::wrong_loss(PoseLevel& level) const {
-  constexpr std::size_t k_enough = 15;  // the finest level's renders are dear
-  std::vector<double> losses = level.losses(places_.grid(k_enough));
-  std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
-  return losses[losses.size() / 2];
-}
-
-PoseResult fit_about_middle(const Device& device, const Scene& scene, const Image& target,
+FittedPose fit_about_middle(const Device& device, const Scene& scene, const Image& target,
                             const PoseOptions& options, std::span<const Pose> initial, bool anywhere,
                             const PoseSolver::Callback& callback) {
   const PosePivot pivot(scene, options.solve_translation);
@@ -365,18 +290,19 @@ PoseResult fit_about_middle(const Device& device, const Scene& scene, const Imag
   }
   const PosePlaces places(pivot.scene(), options, starts.front(), anywhere);
   if (anywhere) starts = {places.about()};
-  PoseResult result = Fit(device, pivot.scene(), target, options, starts, places, report).run(anywhere);
+  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, report).run(anywhere);
+  PoseResult& result = fitted.result;
   pivot.to_origin(result.pose, result.covariance);
   result.pose = pivot.to_origin(result.pose);
   result.start = initial.front();
   for (PoseHypothesis& h : result.equals) h.pose = pivot.to_origin(h.pose);
   for (PoseIteration& step : result.history) step.pose = pivot.to_origin(step.pose);
-  return result;
+  return fitted;
 }
 
 }  // namespace
 
-PoseResult fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
+FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {
   if (const std::optional<PoseBox> box = box_of_search(options, anywhere)) {
     const PoseProblem part = cut_to_box(scene, target, options, *box);

@@ -1,0 +1,43 @@
+// Options of least squares.
+#include "cli/pose_options.hpp"
+
+#include "base/name_list.hpp"
+#include "cli/pose_report.hpp"
+#include "dpr/image.hpp"
+
+namespace dpr::cli {
+
+void add_least_squares_options(CLI::App& command, const char* group, LeastSquaresOptions& options) {
+  LeastSquares& method = options.method;
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    return command.add_option(name, value, description)->group(group)->type_name(type);
+  };
+  add("--rotations", method.rotations,
+      "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
+  add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
+  add("--level-iterations", method.iterations,
+      "Steps a level, more while the best pose still improves; 10 by default", "N");
+  add("--blur", method.blur, "Blur of the edges, in pixels of the level; 0.25 by default", "FLOAT");
+  add("--robust", method.robust_scale,
+      "Weighs pixels of other colours (clutter, occlusion) hardly at all; a number is the colour difference "
+      "from which on, else the residuals tell",
+      "[FLOAT]")
+      ->expected(0, 1);
+  add("--light", options.light,
+      "Light of the target: harmonics, by default, finds any distant light, gain one that differs in colour "
+      "and brightness alone, where the scene's own light does not explain the target; fixed does not look",
+      "harmonics|gain|fixed");
+  add("--mask", options.mask,
+      "Image whose first channel is the weight of every pixel, in [0, 1], in all comparisons: what lies "
+      "outside is not looked at",
+      "MASK.png");
+}
+
+LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options) {
+  LeastSquares method = options.method;
+  method.robust = command.count("--robust") > 0;
+  method.light = static_cast<PoseLight>(position_of(options.light, light_names(), "--light (command line)"));
+  return method;
+}
+
+}  // namespace dpr::cli

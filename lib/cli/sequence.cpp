@@ -1,0 +1,204 @@
+// Files of sequences.
+#include "cli/sequence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "base/checks.hpp"
+#include "base/input_file.hpp"
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+constexpr const char* k_digits = "0123456789";
+
+bool has_extension(const std::filesystem::path& file, std::span<const std::string_view> extensions) {
+  return std::ranges::find(extensions, lower_case_extension(file)) != extensions.end();
+}
+
+bool is_video(const std::filesystem::path& file) {
+  static constexpr std::array<std::string_view, 9> extensions{".mp4", ".m4v",  ".mov",  ".avi", ".mkv",
+                                                              ".mpg", ".mpeg", ".webm", ".gif"};
+  return has_extension(file, extensions);
+}
+
+bool is_image(const std::filesystem::path& file) {
+  static constexpr std::array<std::string_view, 13> extensions{".png",  ".jpg",  ".jpeg", ".exr", ".tif",
+                                                               ".tiff", ".bmp",  ".tga",  ".ppm", ".pgm",
+                                                               ".hdr",  ".webp", ".jp2"};
+  return has_extension(file, extensions);
+}
+
+std::string named(const std::string& name) { return "--sequence " + name + " (command line)"; }
+
+/// Entries of a folder that hold images, in natural order.
+std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::vector<std::filesystem::path> files;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (!std::filesystem::is_directory(entry->path()) && is_image(entry->path()))
+      files.push_back(entry->path());
+  }
+  if (error) throw IoError(folder, error.message());
+  std::ranges::sort(files, [](const auto& a, const auto& b) {
+    return is_naturally_less(a.filename().string(), b.filename().string());
+  });
+  return files;
+}
+
+/// A file name with a number in it: "%04d", "%d" or "####".
+struct NumberedName {
+  std::string prefix, suffix;
+  std::size_t width = 0;  ///< least number of digits
+
+  std::string with(std::uint64_t number) const {
+    const std::string digits = std::to_string(number);
+    return prefix + std::string(width > digits.size() ? width - digits.size() : 0, '0') + digits + suffix;
+  }
+  /// The number of a name that with() would make.
+  std::optional<std::uint64_t> number_of(const std::string& name) const {
+    if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) || !name.ends_with(suffix))
+      return std::nullopt;
+    const char* const begin = name.data() + prefix.size();
+    const char* const end = name.data() + name.size() - suffix.size();
+    std::uint64_t number = 0;
+    const auto [rest, error] = std::from_chars(begin, end, number);
+    if (error != std::errc() || rest != end || with(number) != name) return std::nullopt;
+    return number;
+  }
+};
+
+/// None of a name without a place for a number.
+std::optional<NumberedName> numbered_name(const std::string& name) {
+  const std::size_t hash = name.find('#');
+  if (hash != std::string::npos) {
+    const std::size_t end = std::min(name.find_first_not_of('#', hash), name.size());
+    return NumberedName{name.substr(0, hash), name.substr(end), end - hash};
+  }
+  const std::size_t percent = name.find('%');
+  if (percent == std::string::npos) return std::nullopt;
+  const std::size_t end = name.find_first_not_of(k_digits, percent + 1);
+  if (end == std::string::npos || name[end] != 'd') return std::nullopt;
+  std::size_t width = 0;
+  std::from_chars(name.data() + percent + 1, name.data() + end, width);
+  constexpr std::size_t k_most_digits = 19;
+  if (width > k_most_digits) return std::nullopt;
+  return NumberedName{name.substr(0, percent), name.substr(end + 1), width};
+}
+
+/// From the lowest number to the highest, or to the first that is missing, whose file will not be found.
+std::vector<std::filesystem::path> numbered_files(const std::filesystem::path& pattern,
+                                                  const NumberedName& name) {
+  const std::filesystem::path folder = pattern.parent_path();
+  std::error_code error;
+  std::vector<std::uint64_t> numbers;
+  for (std::filesystem::directory_iterator entry(folder.empty() ? "." : folder, error), end;
+       !error && entry != end; entry.increment(error)) {
+    if (const auto number = name.number_of(entry->path().filename().string())) numbers.push_back(*number);
+  }
+  if (error) throw IoError(folder, error.message());
+  std::ranges::sort(numbers);
+  std::vector<std::filesystem::path> files;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::uint64_t expected = numbers.front() + i;
+    files.push_back(folder / name.with(expected));
+    if (numbers[i] != expected) break;
+  }
+  return files;
+}
+
+/// What a name stands for.
+std::vector<std::filesystem::path> files_of(const std::string& name) {
+  const std::filesystem::path path(name);
+  if (std::filesystem::is_directory(path)) {
+    std::vector<std::filesystem::path> files = images_in(path);
+    if (files.empty()) throw InvalidArgument(named(name), "a folder without images", "images in it");
+    return files;
+  }
+  if (std::filesystem::exists(path)) return {path};
+  const auto numbered = numbered_name(path.filename().string());
+  if (!numbered) return {path};  // not there, which is an error when its turn comes
+  std::vector<std::filesystem::path> files = numbered_files(path, *numbered);
+  if (files.empty()) {
+    throw InvalidArgument(named(name), "no file that matches",
+                          "a file, a folder, or a pattern such as frames/%04d.png of files that are there");
+  }
+  return files;
+}
+
+}  // namespace
+
+bool is_naturally_less(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto number_at = [](const std::string& text, std::size_t& at) {
+      const std::size_t end = std::min(text.find_first_not_of(k_digits, at), text.size());
+      const std::size_t begin = std::min(text.find_first_not_of('0', at), end);
+      at = end;
+      return text.substr(begin, end - begin);
+    };
+    const std::string m = number_at(a, i), n = number_at(b, j);
+    if (m.size() != n.size()) return m.size() < n.size();
+    if (m != n) return m < n;
+  }
+  if (i < a.size() || j < b.size()) return j < b.size();
+  return a < b;  // the same but for zeros in front
+}
+
+Sequence::Sequence(const std::vector<std::string>& names, Encoding encoding, const Scene& scene)
+    : encoding_(encoding), width_(scene.width), height_(scene.height) {
+  for (const std::string& name : names) {
+    for (std::filesystem::path& file : files_of(name)) files_.push_back(std::move(file));
+  }
+  if (std::ranges::none_of(files_, is_video)) size_ = files_.size();
+}
+
+std::optional<SequenceFrame> Sequence::next() {
+  while (!files_.empty()) {
+    const std::filesystem::path file = files_.front();
+    if (!is_video(file)) {
+      files_.pop_front();
+      return checked(file.string(), read_image(file, nullptr, encoding_));
+    }
+    if (auto frame = next_of_video()) return frame;
+    files_.pop_front();
+  }
+  return std::nullopt;
+}
+
+std::optional<SequenceFrame> Sequence::next_of_video() {
+  if (!video_) {
+    video_.emplace(files_.front(), encoding_);
+    video_frame_ = 0;
+  }
+  Image image;
+  if (!video_->next(image)) {
+    video_.reset();
+    return std::nullopt;
+  }
+  return checked(files_.front().string() + ":" + std::to_string(video_frame_++), std::move(image));
+}
+
+SequenceFrame Sequence::checked(std::string file, Image image) const {
+  if (image.width != width_ || image.height != height_) {
+    throw InvalidArgument("size of " + named(file), checks::size(image.width, image.height),
+                          checks::size(width_, height_) + ", the scene's");
+  }
+  return {std::move(file), std::move(image)};
+}
+
+}  // namespace dpr::cli

@@ -1,0 +1,114 @@
+// Beams of hypotheses.
+#include "solve/pose_beam.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "solve/pose_scatter.hpp"
+#include "solve/rotation_grid.hpp"
+
+namespace dpr {
+namespace {
+
+// A robust loss says little of a pose until details show: more must stay.
+constexpr Beam k_beam{96, 24, 12, 8}, k_robust_beam{192, 96, 32, 8};
+// Hypotheses that move the object's rim by less than this against each other are one.
+constexpr double k_same_pixels = 0.5;
+
+}  // namespace
+
+const Beam& beam_of(const LeastSquares& method) { return method.robust ? k_robust_beam : k_beam; }
+
+std::size_t most_at(const Beam& beam, std::size_t level) { return beam[std::min(level, beam.size() - 1)]; }
+
+double explained_part(float explained, bool is_robust) {
+  return static_cast<double>(is_robust ? std::sqrt(explained) : explained);
+}
+
+std::vector<Hypothesis> hypotheses_at(const glm::dvec3& translation, std::size_t rotations) {
+  std::vector<Hypothesis> result;
+  for (const glm::dmat3& rotation : rotation_grid(rotations)) result.push_back({{rotation, translation}});
+  return result;
+}
+
+double wrong_loss(PoseLevel& level, std::span<const Hypothesis> hypotheses) {
+  std::vector<double> losses = level.losses(hypotheses);
+  std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
+  return losses[losses.size() / 2];
+}
+
+std::vector<Candidate> least_losses(PoseLevel& level, std::span<const Hypothesis> hypotheses,
+                                    std::size_t count) {
+  const std::vector<double> losses = level.losses(hypotheses);
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    candidates.push_back({hypotheses[i]});
+    candidates.back().equations.loss = losses[i];
+  }
+  std::ranges::stable_sort(candidates, by_loss);
+  candidates.resize(std::min(candidates.size(), count));
+  return candidates;
+}
+
+bool refine_distinct(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates,
+                     const BeamWork& work, const std::function<bool()>& report) {
+  constexpr unsigned k_few = 4;  // within which many come to the same pose, or to none
+  const auto keep_distinct = [&](std::size_t count) {
+    candidates = distinct(std::move(candidates), space, k_same_pixels * level.pixel_ndc(), count);
+    drop_hopeless(candidates, 0, k_hope, work.wrong_loss);
+  };
+  const unsigned enough = work.iterations, few = std::min(k_few, enough);
+  for (Candidate& candidate : candidates) candidate.restart();
+  bool goes_on = refine(level, space, candidates, {few, few}, report);
+  keep_distinct(candidates.size());
+  if (goes_on && enough > few)
+    goes_on = refine(level, space, candidates, {enough - few, k_patience * enough - few}, report);
+  keep_distinct(work.keep);
+  return goes_on;
+}
+
+void drop_hopeless_at(PoseLevel& level, std::vector<Candidate>& candidates, std::size_t first,
+                      const Hope& hope, double wrong_loss) {
+  const std::vector<double> losses = level.losses(hypotheses_of(candidates));
+  for (std::size_t i = 0; i < losses.size(); ++i) candidates[i].equations.loss = losses[i];
+  drop_hopeless(candidates, first, hope, wrong_loss);
+}
+
+void add_half_turns(std::vector<Candidate>& candidates, std::span<const glm::dmat3> half_turns,
+                    std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const glm::dmat3& turn : half_turns) {
+      Candidate turned = candidates[i];
+      turned.hypothesis.pose.rotation *= turn;
+      turned.is_initial = false;
+      candidates.push_back(turned);
+    }
+  }
+}
+
+double enough_to_equal(double best, double wrong) {
+  return best + k_equal_losses * std::max(wrong - best, 0.0);
+}
+
+void set_robust_scale(PoseLevel& level, const LeastSquares& method, std::span<const Hypothesis> hypotheses) {
+  // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
+  // residuals of wrong hypotheses have it, clutter would count.
+  constexpr float k_least_robust_scale = 0.1F, k_most_robust_scale = 0.12F;
+  if (method.robust_scale > 0) {
+    level.set_color_scale(method.robust_scale);
+    return;
+  }
+  level.estimate_scale(hypotheses);
+  const float scale = level.scales().color;
+  if (scale > 0) level.set_color_scale(std::clamp(scale, k_least_robust_scale, k_most_robust_scale));
+}
+
+std::vector<double> pose_covariance(PoseLevel& level, const PoseSpace& space, const Hypothesis& hypothesis) {
+  const ScoreCells cells = level.score_cells(hypothesis);
+  NormalEquations equations = cells.equations;
+  equations.scatter = score_scatter(cells, space.size(), level.scales().color);
+  const std::vector<double> result = covariance(equations, space.size());
+  return result.empty() ? result : space.to_world(result);
+}
+
+}  // namespace dpr

@@ -1,0 +1,63 @@
+// A tracker's levels.
+#include "solve/track_levels.hpp"
+
+#include <cmath>
+
+#include "solve/pose_pyramid.hpp"
+
+namespace dpr {
+
+TrackLevels::TrackLevels(const Device& device, const Scene& scene, const PoseOptions& options,
+                         const FittedPose& first, const Pose& near, const Image& frame)
+    : space_(scene, near, options),
+      view_(scene.camera.view),
+      near_depth_(depth_of(near)),
+      unexplained_part_(first.unexplained_part),
+      is_orthographic_(scene.camera.orthographic_height.has_value()),
+      frame_(&frame) {
+  const auto& method = std::get<LeastSquares>(options.method);
+  std::vector<LevelShape> shapes = level_shapes(scene, method);
+  shapes.pop_back();  // the last but one has the frame's size too
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    // The coarsest images constrain a light's direction so little that it would explain any pose.
+    const bool is_coarse = i == 0 && shapes.size() > 1 && first.result.light == PoseLight::harmonics;
+    const PoseLight light = is_coarse ? PoseLight::gain : first.result.light;
+    levels_.emplace_back(
+        new Level{.level = PoseLevel(device, scene, frame, method, space_, shapes[i], light, first.normals),
+                  .has_frame = true});
+    levels_.back()->level.set_color_scale(first.color_scale);
+  }
+}
+
+void TrackLevels::set_frame(const Image& frame) {
+  frame_ = &frame;
+  for (const auto& level : levels_) {
+    level->has_frame = false;
+    level->unexplained = -1;
+  }
+}
+
+PoseLevel& TrackLevels::at(std::size_t level) {
+  Level& found = *levels_[level];
+  if (!found.has_frame) found.level.set_target(*frame_);
+  found.has_frame = true;
+  return found.level;
+}
+
+double TrackLevels::unexplained(std::size_t level) {
+  Level& found = *levels_[level];
+  if (found.unexplained < 0) found.unexplained = unexplained_part_ * at(level).blank_loss();
+  return found.unexplained;
+}
+
+double TrackLevels::depth_of(const Pose& pose) const {
+  return -(view_ * glm::dvec4(pose.translation, 1.0)).z;
+}
+
+bool TrackLevels::suits(const Pose& pose) const {
+  constexpr double k_most = 1.5;
+  const double ratio = depth_of(pose) / near_depth_;
+  return is_orthographic_ || (ratio > 1 / k_most && ratio < k_most);
+}
+
+}  // namespace dpr
