@@ -70,8 +70,8 @@ struct TrackedPose {
 /// before, it begins anew at the coarsest size. An object that is lost all the same is searched for
 /// (TrackOptions::search_interval), which takes tenths of a second about the last place and seconds everywhere.
 ///
-/// Renderers and buffers are kept: a frame that is tracked builds no kernel and, once sizes have settled, allocates
-/// nothing on the device. They are made anew where the object's distance has changed by half. Results are the same bits
+/// Renderers and buffers are kept: a frame that is tracked builds no kernel and seldom allocates on the device, where the
+/// object takes more room than ever before. They are made anew where the object's distance has changed by half. Results are the same bits
 /// from run to run on a device. Not thread-safe; movable.
 class DPR_API PoseTracker {
  public:
