@@ -71,8 +71,8 @@ struct TrackedPose {
 /// (TrackOptions::search_interval), which takes tenths of a second about the last place and seconds everywhere.
 ///
 /// Renderers and buffers are kept: a frame that is tracked builds no kernel and seldom allocates on the device, where the
-/// object takes more room than ever before. They are made anew where the object's distance has changed by half. Results are the same bits
-/// from run to run on a device. Not thread-safe; movable.
+/// object takes more room than ever before. They are made anew where the object's distance has changed by half. Results
+/// are the same bits from run to run on a device. Not thread-safe; movable.
 class DPR_API PoseTracker {
  public:
   /// Throws InvalidArgument as PoseSolver does, for silhouettes and depths, and for options out of their range.

@@ -126,14 +126,14 @@ bool plot_track(const std::filesystem::path& file, const std::vector<TrackRow>& 
 std::vector<TableRow> table(const std::vector<TrackRow>& rows) {
   std::vector<TableRow> result{
       {"frame", "file", "status", "rotation vector, radians", "translation", "loss"}};
-  const auto text = [](const glm::dvec3& v) { return format("%.5g, %.5g, %.5g", v.x, v.y, v.z); };
+  const auto text = [](const glm::dvec3& v) { return format("%.4g, %.4g, %.4g", v.x, v.y, v.z); };
   const std::size_t step = (rows.size() + k_most_rows - 1) / k_most_rows;
   for (std::size_t i = 0; i < rows.size(); i += step) {
     const TrackRow& row = rows[i];
     const Pose& pose = row.found.pose;
     result.push_back({std::to_string(row.frame), row.file, std::string(name_of(row.found.status)),
                       is_lost(row) ? "" : text(vector_from_rotation(pose.rotation)),
-                      is_lost(row) ? "" : text(pose.translation), format("%.4g", row.found.loss)});
+                      is_lost(row) ? "" : text(pose.translation), format("%.2e", row.found.loss)});
   }
   return result;
 }
