@@ -16,6 +16,7 @@ void run_estimators(const Settings& settings);
 void run_devices(const Settings& settings);
 void run_batches(const Settings& settings);
 void run_shapes(const Settings& settings);
+void run_cameras(const Settings& settings);
 void run_lights(const Settings& settings);
 void run_textures(const Settings& settings);
 void run_photograph(const Settings& settings);
@@ -34,6 +35,7 @@ std::span<const Experiment> experiments() {
        run_batches},
       {"shapes", "Shape and colours from 24 views, and the paper's alternatives at the same budget",
        run_shapes},
+      {"cameras", "Shape and colours from 24 views whose cameras are off, refined or not", run_cameras},
       {"lights", "Lights of every kind found from noisy pictures of a known shape", run_lights},
       {"textures", "A texture found from 24 lit views of a known shape, from grey", run_textures},
       {"photograph", "A face's template bent to a photograph: camera, light, then shape", run_photograph},

@@ -1,6 +1,6 @@
 // Shapes from views: a coloured mesh rendered rigidly from 24 cameras, fitted from a sphere, and compared
 // with the truth in volume and in views that the fit has not seen; the paper's alternatives at the same
-// budget.
+// budget, and cameras that are not where they are said to be.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cli/fit_report.hpp"
+#include "dpr/pose.hpp"
 #include "dpr/shape.hpp"
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
@@ -85,9 +86,10 @@ struct Method {
   std::string name;
   ShapeOptions options;
   std::string preset;  // of the smoothing, with the default's sigma and gamma; empty: the default
+  bool are_cameras_off = false;
 };
 
-std::vector<Method> make_methods(bool smoke) {
+ShapeOptions default_options(bool smoke) {
   ShapeOptions options;
   if (smoke) {
     options.iterations = 40;
@@ -95,6 +97,11 @@ std::vector<Method> make_methods(bool smoke) {
     options.learning_rate = 0.1;
     options.lambda = 2;  // a mesh this small is stiff
   }
+  return options;
+}
+
+std::vector<Method> make_methods(bool smoke) {
+  const ShapeOptions options = default_options(smoke);
   ShapeOptions adaptive = options;
   adaptive.schedule = ShapeSchedule::adaptive;
   ShapeOptions large = options;  // the reach of Nicolet et al., and the steps that it takes
@@ -117,6 +124,43 @@ std::vector<Method> make_methods(bool smoke) {
           {"softras", narrow, "softras"},
           {"adaptive smoothing", adaptive, ""},
           {"direct steps, Laplacian", paper, ""}};
+}
+
+std::vector<Method> make_camera_methods(bool smoke) {
+  const ShapeOptions options = default_options(smoke);
+  ShapeOptions refined = options;
+  refined.refine_cameras = true;
+  return {{"right", options, ""},
+          {"right, refined", refined, ""},
+          {"off", options, "", true},
+          {"off, refined", refined, "", true}};
+}
+
+/// Turns cameras about the origin and moves them, by half a degree and a hundredth of their distance in the root mean
+/// square, or as many pixels of smaller images. The mean over the cameras is left out: it would turn and move the
+/// object.
+void disturb(std::vector<ShapeView>& views) {
+  constexpr double k_width = 128, k_axes = 3;
+  const double scale = k_width / views.front().image.width, degrees = 0.5 * scale, part = 0.01 * scale;
+  std::mt19937_64 generator(k_seed);
+  std::normal_distribution<double> normal;
+  const auto errors = [&](double deviation) {
+    std::vector<glm::dvec3> list(views.size());
+    glm::dvec3 mean(0.0);
+    for (glm::dvec3& error : list) {
+      for (int k = 0; k < 3; ++k) error[k] = deviation / std::sqrt(k_axes) * normal(generator);
+      mean += error / static_cast<double>(list.size());
+    }
+    for (glm::dvec3& error : list) error -= mean;
+    return list;
+  };
+  const std::vector<glm::dvec3> turns = errors(glm::radians(degrees)), shifts = errors(part);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const glm::dmat4 view(views[i].camera.view);
+    glm::dmat4 error(rotation_from_vector(turns[i]));
+    error[3] = glm::dvec4(glm::length(glm::dvec3(view[3])) * shifts[i], 1.0);
+    views[i].camera.view = glm::mat4(view * error);
+  }
 }
 
 Image row_of(const std::vector<Image>& images) {
@@ -142,6 +186,7 @@ class Trial {
 
   Json run(const Method& method) {
     ShapeViews views = views_;
+    if (method.are_cameras_off) disturb(views.views);
     if (!method.preset.empty()) {
       const Smoothing finest = finest_smoothing(views, method.options);
       views.smoothing = scaled_smoothing(method.preset, finest.sigma, finest.gamma);
@@ -216,6 +261,16 @@ void run_shapes(const Settings& settings) {
   for (Trial& trial : trials) {
     for (std::size_t i = 1; i < methods.size(); ++i) run(trial, methods[i]);
   }
+}
+
+void run_cameras(const Settings& settings) {
+  Json rows = Json::array();
+  for (Shape& shape : make_shapes(settings.smoke)) {
+    Trial trial(settings, std::move(shape));
+    for (const Method& method : make_camera_methods(settings.smoke)) rows.push_back(trial.run(method));
+  }
+  write_data(settings, "cameras",
+             {{"views", k_views}, {"held_out", k_held_out}, {"voxels", k_voxels}, {"rows", rows}});
 }
 
 }  // namespace dpr::experiments

@@ -81,6 +81,11 @@ struct ShapeOptions {
   double learning_rate_end =
       0.2;  ///< > 0: of either learning rate, at a level's end, of that at its beginning
   double color_learning_rate = 0.05;  ///< >= 0; 0: the colours stay
+  /// Moves the cameras too, each by a rotation and a translation, in the second half of every level: for at least two
+  /// views, whose cameras are a few pixels off. Where the object stands is then known as well as the cameras are on
+  /// average.
+  bool refine_cameras = false;
+  double camera_learning_rate = 0.01;  ///< > 0: of rotations in radians, and of translations in those radii
   LossWeights loss{.l1 = 4, .silhouette = 1};
   /// >= 0: of mean absolute differences of depths, in radii of that sphere, and of normals' components, where
   /// views have images of them. Each costs about as much as the images.
@@ -115,6 +120,7 @@ struct ShapeResult {
   bool finished = false;                ///< false: the callback stopped it
   double seconds = 0;                   ///< of this run
   std::vector<ShapeIteration> history;  ///< also of the runs that it goes on from
+  std::vector<Camera> cameras;  ///< [view] as given, or as ShapeOptions::refine_cameras has found them
 };
 
 /// Finds a mesh with vertex colours that explains several images, on one device or on several, each with a

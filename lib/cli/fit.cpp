@@ -15,6 +15,7 @@
 #include "cli/option_names.hpp"
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
+#include "cli/views_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/photographs.hpp"
 #include "scene/scene_json.hpp"
@@ -28,7 +29,8 @@ const char* const k_solver_group = "Solver";
 const char* const k_loss_group = "Loss (weights)";
 
 struct FitCommandOptions {
-  std::string views, initial, output, report, checkpoint, steps = "large", schedule = "anneal", light;
+  std::string views, initial, output, saved_views, report, checkpoint, steps = "large", schedule = "anneal",
+                                                                       light;
   ShapeOptions solver;
 };
 
@@ -56,12 +58,12 @@ void resize(ShapeViews& views, glm::ivec2 size) {
   views.height = size.y;
 }
 
-/// The views that the file describes, with --size, --seed and the smoothing flags in the place of its values.
-/// Reads the views. The smoothing is the solver's if neither the file nor the options name one.
-ShapeViews read_views(const CLI::App& command, const FitCommandOptions& options,
+/// The views that the file's text describes, with --size, --seed and the smoothing flags in the place of its values.
+/// The smoothing is the solver's if neither the file nor the options name one.
+ShapeViews read_views(const CLI::App& command, const std::string& text, const FitCommandOptions& options,
                       const CommonOptions& common) {
   Notes notes;
-  ViewsFile file = parse_views_file(options.views, read_file(options.views), notes, common.encoding());
+  ViewsFile file = parse_views_file(options.views, text, notes, common.encoding());
   ShapeViews& views = file.views;
   if (!options.initial.empty()) views.initial = read_mesh(options.initial, notes);
   if (std::ranges::none_of(views.views, &ShapeView::has_alpha)) {
@@ -102,7 +104,9 @@ void check_outputs(const FitCommandOptions& options) {
                           "a file .obj, .ply or .glb");
   }
   require_writable(options.output);
-  if (!options.checkpoint.empty()) require_writable(options.checkpoint);
+  for (const std::string& file : {options.checkpoint, options.saved_views}) {
+    if (!file.empty()) require_writable(file);
+  }
 }
 
 /// Finds the cameras of the views that have none. Reports unlikely results.
@@ -160,7 +164,8 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
-  ShapeViews views = read_views(command, options, common);
+  const std::string text = read_file(options.views);
+  ShapeViews views = read_views(command, text, options, common);
   require_measured(command, "--depth", options.solver.depth, views, &ShapeView::depth, "depth");
   require_measured(command, "--normal", options.solver.normal, views, &ShapeView::normal, "normal");
   const std::vector<Device> devices = open_devices(common);
@@ -185,6 +190,8 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   };
   const ShapeResult result = solver.solve(watch, options.checkpoint);
   write_mesh(options.output, result.mesh);
+  for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
+  if (!options.saved_views.empty()) write_views(options.saved_views, {options.views, text}, views);
   if (report_failed) std::rethrow_exception(report_failed);
   if (report) {
     const std::string views_file = std::filesystem::path(options.views).filename().string();
@@ -231,6 +238,12 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   add("--learning-rate-end", solver.learning_rate_end,
       "Size of all steps at a level's end over that at its beginning", "FLOAT");
   add("--color-learning-rate", solver.color_learning_rate, "Size of the steps of colours", "FLOAT");
+  command
+      .add_flag("--refine-cameras", solver.refine_cameras,
+                "Moves cameras that are a few pixels off, in the second half of each level")
+      ->group(k_solver_group);
+  add("--camera-learning-rate", solver.camera_learning_rate,
+      "Size of the steps of cameras, in radians and in radii of the first sphere", "FLOAT");
   add("--rigidity", solver.rigidity,
       "Weight of the mean squared strain against the start; with --remesh-interval 0", "FLOAT");
   add("--checkpoint-interval", solver.checkpoint_interval, "Steps between two checkpoints", "N");
@@ -285,6 +298,10 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
   command->add_option("-o,--output", options->output, "Mesh to write, OBJ, PLY or GLB")
       ->required()
       ->type_name("MESH.obj");
+  command
+      ->add_option("--save-views", options->saved_views,
+                   "Views file to write: --views with the cameras that were found or refined")
+      ->type_name("V.json");
   command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")
       ->type_name("DIR");
   command

@@ -67,6 +67,7 @@ void add(Hash& hash, const ShapeOptions& o) {
   hash.add(o.learning_rate);
   hash.add(o.learning_rate_end);
   hash.add(o.color_learning_rate);
+  if (o.refine_cameras) hash.add(o.camera_learning_rate);
 }
 
 /// Depths or normals and what they weigh, if there are any.

@@ -9,7 +9,6 @@
 #include <system_error>
 #include <utility>
 
-#include "base/checks.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/multi_device.hpp"
 #include "loss/image_loss_impl.hpp"
@@ -19,8 +18,9 @@
 #include "scene/gradient_table.hpp"
 #include "solve/by_smoothing.hpp"
 #include "solve/large_steps.hpp"
-#include "solve/measured_images.hpp"
 #include "solve/rigidity.hpp"
+#include "solve/shape_cameras.hpp"
+#include "solve/shape_checks.hpp"
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
@@ -75,6 +75,7 @@ class Run {
     }
     renderer_.set_chunk(options.chunk > 0 || devices.size() > 1 ? options.chunk : options.batch);
     if (options.rigidity > 0) rigidity_.emplace(start, static_cast<double>(options.rigidity));
+    if (options.refine_cameras && state_.cameras.empty()) state_.cameras = unmoved_cameras(views);
   }
 
   /// One iteration; what it evaluated is the history's last.
@@ -82,7 +83,10 @@ class Run {
     const unsigned level = state_.iteration / options_.iterations;
     const unsigned in_level = state_.iteration % options_.iterations;
     const bool is_new_level = !level_ || in_level == 0;
-    if (is_new_level) level_.emplace(views_, options_, level);
+    if (is_new_level) {
+      level_.emplace(views_, options_, level);
+      level_->set_cameras(state_.cameras);
+    }
     const bool remeshes = options_.remesh_interval > 0 && in_level % options_.remesh_interval == 0 &&
                           2 * in_level < options_.iterations;
     if (remeshes) make_mesh_anew(level);
@@ -96,6 +100,9 @@ class Run {
     if (color_optimizer_) color_optimizer_->set_learning_rate(rate * options_.color_learning_rate);
     const SceneGradient gradient = evaluate(level, in_level);
     descend(gradient);
+    const bool is_second_half = 2 * in_level >= options_.iterations;  // the shape is nearly there
+    if (options_.refine_cameras && is_second_half)
+      refine_cameras(gradient.views, in_level, rate * options_.camera_learning_rate);
     if (is_adaptive()) adapt(level, in_level, by_smoothing(finest_, gradient));
     ++state_.iteration;
   }
@@ -145,6 +152,7 @@ class Run {
     scene.gradients.positions = true;
     scene.gradients.colors = color_optimizer_.has_value();
     scene.gradients.smoothing = is_adaptive();
+    scene.gradients.camera = options_.refine_cameras;
     renderer_.set_scene(scene);
     renderer_.set_views(level_->views);
     renderer_.set_mesh_loss(scaled_regularizers());
@@ -233,6 +241,15 @@ class Run {
     if (color_optimizer_) add(state_.colors, color_optimizer_->step(flat(grad.colors)));
   }
 
+  void refine_cameras(std::span<const ViewGradient> gradients, unsigned in_level, double learning_rate) {
+    const auto [first, count] = level_->batch(in_level);
+    move_cameras(gradients, std::span(level_->order).subspan(first, count), common_, learning_rate,
+                 state_.cameras);
+    if (in_level + 1 == options_.iterations) anchor(views_, common_, state_.cameras, state_.positions);
+    level_->set_cameras(state_.cameras);
+    renderer_.set_views(level_->views);
+  }
+
   const ShapeViews& views_;
   const ShapeOptions& options_;
   CommonView common_;
@@ -246,68 +263,6 @@ class Run {
   std::vector<double> rigidity_gradient_;  // at the last positions
   ShapeState state_;
 };
-
-void check(const ShapeViews& views) {
-  if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
-  if (views.width < 1 || views.height < 1) {
-    throw InvalidArgument("size (shape)", checks::size(views.width, views.height), "at least 1x1");
-  }
-  for (std::size_t i = 0; i < views.views.size(); ++i) {
-    const ShapeView& view = views.views[i];
-    const Image &image = view.image, &mask = view.mask;
-    const std::string name = checks::element("views", i);
-    if (image.width != views.width || image.height != views.height) {
-      throw InvalidArgument(checks::in("size of " + name, "shape"), checks::size(image.width, image.height),
-                            checks::size(views.width, views.height));
-    }
-    checks::require_pixels(image, checks::in(name, "shape"));
-    if (!mask.pixels.empty()) require_mask(mask, image, checks::in("mask of " + name, "shape"));
-    validate(view.camera, name + ".camera");
-  }
-  for (const Measured kind : {Measured::depth, Measured::normal}) check_measured(views, kind);
-  require_known_cameras(views, "shape");
-  checks::require_finite(views.background, "background (shape)");
-  if (views.initial) validate(*views.initial, "initial (shape)");
-  if (views.lights) validate(*views.lights);
-  if (views.smoothing) validate(*views.smoothing);
-}
-
-bool compares_colors(const LossWeights& weights) {
-  return std::ranges::any_of(image_losses(), [&](const ImageLossRow& loss) {
-    return !loss.reads_alpha && weights.*loss.weight > 0;
-  });
-}
-
-void check(const ShapeOptions& o, const ShapeViews& views) {
-  const auto positive = [](double x) { return x > 0 && std::isfinite(x); };
-  const auto not_negative = [](double x) { return x >= 0 && std::isfinite(x); };
-  const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
-  require(o.levels > 0 && o.levels <= most, "levels (shape)", o.levels,
-          "at least 1, and a pixel a side at the coarsest");
-  require(o.iterations > 0 && o.iterations <= std::numeric_limits<unsigned>::max() / o.levels,
-          "iterations (shape)", o.iterations, "at least 1, and below 2^32 in all levels");
-  require(o.batch > 0, "batch (shape)", o.batch, "at least 1");
-  require(o.checkpoint_interval > 0, "checkpoint_interval (shape)", o.checkpoint_interval, "at least 1");
-  require(positive(o.edge_pixels), "edge_pixels (shape)", o.edge_pixels, "a finite number above 0");
-  require(positive(o.blur), "blur (shape)", o.blur, "a finite number above 0");
-  require(positive(o.blur_end), "blur_end (shape)", o.blur_end, "a finite number above 0");
-  const bool all_have_alpha = std::ranges::all_of(views.views, &ShapeView::has_alpha);
-  if (!all_have_alpha && !compares_colors(o.loss)) {
-    throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
-                          "one of colours too");
-  }
-  require(not_negative(o.lambda), "lambda (shape)", o.lambda, "a finite number, at least 0");
-  require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");
-  require(positive(o.learning_rate_end), "learning_rate_end (shape)", o.learning_rate_end,
-          "a finite number above 0");
-  require(not_negative(o.color_learning_rate), "color_learning_rate (shape)", o.color_learning_rate,
-          "a finite number, at least 0");
-  require(not_negative(o.depth), "depth (shape)", o.depth, "a finite number, at least 0");
-  require(not_negative(o.normal), "normal (shape)", o.normal, "a finite number, at least 0");
-  require(not_negative(o.rigidity), "rigidity (shape)", o.rigidity, "a finite number, at least 0");
-  require(o.rigidity == 0 || o.remesh_interval == 0, "remesh_interval (shape)", o.remesh_interval,
-          "0 beside a rigidity: it compares with the start, whose faces have to stay");
-}
 
 /// The mesh to begin with; colours that are not known are grey.
 Mesh make_start(const ShapeViews& views) {
@@ -339,8 +294,8 @@ ShapeSolver::ShapeSolver(Device device, ShapeViews views, ShapeOptions options)
 ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOptions options)
     : devices_(std::move(devices)), views_(std::move(views)), options_(options) {
   check_devices(devices_);
-  check(views_);
-  check(options_, views_);
+  check_shape_views(views_);
+  check_shape_options(options_, views_);
   start_ = make_start(views_);
   check_mesh_loss(options_.regularizers, start_);
   const ShapeTargets targets(views_, options_, ShapeLevel(views_, options_, 0));
@@ -358,7 +313,8 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
   const std::uint64_t mark = checkpoint.empty() ? 0 : fingerprint(views_, start_, options_);
   std::error_code unknown;  // then reading it says why
   if (!checkpoint.empty() && (std::filesystem::exists(checkpoint, unknown) || unknown))
-    state = read_checkpoint(checkpoint, mark, finest_smoothing(views_, options_));
+    state = read_checkpoint(checkpoint, mark, finest_smoothing(views_, options_),
+                            options_.refine_cameras ? views_.views.size() : 0);
 
   Run run(devices_, views_, start_, options_, std::move(state));
   bool goes_on = true;
@@ -371,8 +327,12 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
       write_checkpoint(checkpoint, now, mark);
   }
   const ShapeState& end = run.state();
-  return {start_, end.mesh(), end.iteration == most_iterations(),
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), end.history};
+  return {start_,
+          end.mesh(),
+          end.iteration == most_iterations(),
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+          end.history,
+          moved_cameras(views_, end.cameras)};
 }
 
 }  // namespace dpr

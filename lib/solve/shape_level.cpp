@@ -33,6 +33,11 @@ ShapeLevel::ShapeLevel(const ShapeViews& all, const ShapeOptions& options, unsig
   }
 }
 
+void ShapeLevel::set_cameras(std::span<const ShapeState::MovedCamera> cameras) {
+  for (std::size_t i = 0; !cameras.empty() && i < order.size(); ++i)
+    views[i].camera.view = glm::mat4(cameras[order[i]].view);
+}
+
 std::pair<std::size_t, std::size_t> ShapeLevel::batch(unsigned iteration) const {
   const std::size_t b = iteration % (starts.size() - 1);
   return {starts[b], starts[b + 1] - starts[b]};

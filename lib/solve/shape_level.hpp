@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "dpr/image_loss.hpp"
 #include "dpr/shape.hpp"
+#include "solve/shape_state.hpp"
 
 namespace dpr {
 
@@ -16,6 +18,9 @@ double pixel_scale(const ShapeOptions& options, unsigned level);
 /// The views of a level in batches, one after the other: batch b has the views b, b + batches, ...
 struct ShapeLevel {
   ShapeLevel(const ShapeViews& all, const ShapeOptions& options, unsigned level);
+
+  /// Moves the views; none: they stay.
+  void set_cameras(std::span<const ShapeState::MovedCamera> cameras);
 
   /// Views that an iteration looks at: the first and their number.
   std::pair<std::size_t, std::size_t> batch(unsigned iteration) const;

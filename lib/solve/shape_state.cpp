@@ -19,6 +19,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr std::size_t k_camera_parameters = 6;
+
 /// First bytes of a file. The fingerprint and the checksum follow, and then the content.
 constexpr std::string_view k_magic = "dpr shape checkpoint 4\n";
 constexpr std::size_t k_number_size = 8, k_head_size = k_magic.size() + 2 * k_number_size;
@@ -30,6 +32,23 @@ json to_json(const OptimizerState& state) {
 OptimizerState optimizer_state(const json& node) {
   return {node.at(0).get<std::vector<double>>(), node.at(1).get<std::vector<double>>(),
           node.at(2).get<unsigned>()};
+}
+
+json to_json(const glm::dmat4& matrix) {
+  json numbers = json::array();
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) numbers.push_back(matrix[column][row]);
+  }
+  return numbers;
+}
+
+glm::dmat4 matrix(const json& node) {
+  glm::dmat4 result;
+  std::size_t i = 0;
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) result[column][row] = node.at(i++);
+  }
+  return result;
 }
 
 json to_json(const ShapeIteration& i) {
@@ -58,18 +77,33 @@ ShapeIteration iteration(const json& node, const Smoothing& finest) {
 }
 
 json to_json(const ShapeState& state) {
-  json faces = json::array(), history = json::array();
+  json faces = json::array(), history = json::array(), cameras = json::array();
   for (const glm::uvec3& f : state.faces) faces.push_back({f.x, f.y, f.z});
   for (const ShapeIteration& step : state.history) history.push_back(to_json(step));
-  return {{"iteration", state.iteration},
-          {"faces", faces},
-          {"positions", state.positions},
-          {"colors", state.colors},
-          {"position_steps", to_json(state.position_steps)},
-          {"color_steps", to_json(state.color_steps)},
-          {"adaptive",
-           {state.adaptive.sigma, state.adaptive.gamma, state.adaptive.samples, state.adaptive.average}},
-          {"history", history}};
+  for (const ShapeState::MovedCamera& camera : state.cameras)
+    cameras.push_back({to_json(camera.view), to_json(camera.steps)});
+  json content{{"iteration", state.iteration},
+               {"faces", faces},
+               {"positions", state.positions},
+               {"colors", state.colors},
+               {"position_steps", to_json(state.position_steps)},
+               {"color_steps", to_json(state.color_steps)},
+               {"adaptive",
+                {state.adaptive.sigma, state.adaptive.gamma, state.adaptive.samples, state.adaptive.average}},
+               {"history", history}};
+  if (!cameras.empty()) content["cameras"] = cameras;
+  return content;
+}
+
+/// A rotation and a translation, up to rounding.
+bool is_rigid(const glm::dmat4& view) {
+  constexpr double k_rounding = 1e-3;  // of single precision in a views file, and of many steps
+  const glm::dmat3 linear(view);
+  const glm::dmat3 excess = glm::transpose(linear) * linear - glm::dmat3(1.0);
+  for (int column = 0; column < 3; ++column) {
+    if (!(glm::length(excess[column]) < k_rounding)) return false;
+  }
+  return std::isfinite(glm::dot(view[3], view[3]));
 }
 
 /// Checks the sizes and values that the solver relies on: a checksum detects damage, but not a forged file.
@@ -78,9 +112,9 @@ bool is_consistent(const ShapeState& state) {
   const auto is_finite = [](const std::vector<double>& values) {
     return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
   };
-  const auto fits = [&](const OptimizerState& steps) {
+  const auto fits = [&](const OptimizerState& steps, std::size_t parameters) {
     const std::size_t size = steps.first_moment.size();
-    return (size == 0 || size == state.positions.size()) && steps.second_moment.size() == size &&
+    return (size == 0 || size == parameters) && steps.second_moment.size() == size &&
            is_finite(steps.first_moment) && is_finite(steps.second_moment);
   };
   return vertices > 0 && state.positions.size() == 3 * vertices && state.colors.size() == 3 * vertices &&
@@ -89,7 +123,13 @@ bool is_consistent(const ShapeState& state) {
                              [&](const glm::uvec3& f) {
                                return std::max({f.x, f.y, f.z}) < vertices;
                              }) &&
-         fits(state.position_steps) && fits(state.color_steps) && state.history.size() == state.iteration;
+         fits(state.position_steps, state.positions.size()) &&
+         fits(state.color_steps, state.positions.size()) &&
+         std::ranges::all_of(state.cameras,
+                             [&](const ShapeState::MovedCamera& camera) {
+                               return is_rigid(camera.view) && fits(camera.steps, k_camera_parameters);
+                             }) &&
+         state.history.size() == state.iteration;
 }
 
 /// Throws json's exceptions where the content is another.
@@ -103,6 +143,8 @@ ShapeState state_of(const json& node, const Smoothing& finest) {
   state.color_steps = optimizer_state(node.at("color_steps"));
   const json& adaptive = node.at("adaptive");
   state.adaptive = {adaptive.at(0), adaptive.at(1), adaptive.at(2), adaptive.at(3)};
+  for (const json& camera : node.value("cameras", json::array()))
+    state.cameras.push_back({matrix(camera.at(0)), optimizer_state(camera.at(1))});
   for (const json& step : node.at("history")) state.history.push_back(iteration(step, finest));
   return state;
 }
@@ -128,7 +170,8 @@ class Depth : public nlohmann::json_sax<json> {
   }
 
  private:
-  static constexpr int k_most = 4;  // a list of moments in the list of a state in the content
+  static constexpr int k_most =
+      5;  // a list of moments in a camera's state in the list of cameras in the content
   int depth_ = 0;
 };
 
@@ -179,7 +222,7 @@ void write_checkpoint(const std::filesystem::path& file, const ShapeState& state
 }
 
 ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
-                           const Smoothing& finest) {
+                           const Smoothing& finest, std::size_t cameras) {
   const std::string bytes = read_file(file);
   if (!bytes.starts_with(k_magic)) throw IoError(file, "is no checkpoint of a shape, or of another version");
   const auto fail = [&] { throw IoError(file, "the checkpoint is damaged"); };
@@ -200,7 +243,7 @@ ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fing
   } catch (const json::exception&) {
     fail();
   }
-  if (!is_consistent(state)) fail();
+  if (!is_consistent(state) || state.cameras.size() != cameras) fail();
   return state;
 }
 

@@ -20,11 +20,18 @@ struct ShapeState {
     double average = 0;
   };
 
+  /// A camera that moves along with the shape.
+  struct MovedCamera {
+    glm::dmat4 view{1.0};  ///< world to camera
+    OptimizerState steps;
+  };
+
   unsigned iteration = 0;  ///< the next one
   std::vector<glm::uvec3> faces;
   std::vector<double> positions, colors;  ///< [vertex][3]
   OptimizerState position_steps, color_steps;
   Adaptive adaptive;
+  std::vector<MovedCamera> cameras;  ///< [view] in the order of ShapeViews; empty where they stay
   std::vector<ShapeIteration> history;
 
   /// In single precision, as it is rendered.
@@ -41,8 +48,8 @@ std::string checkpoint_bytes(std::string_view content, std::uint64_t fingerprint
 void write_checkpoint(const std::filesystem::path& file, const ShapeState& state, std::uint64_t fingerprint);
 
 /// A file keeps of the history's smoothings what changes; `finest` is the rest. Throws IoError where the file
-/// is no checkpoint or damaged, InvalidArgument where its fingerprint is another.
+/// is no checkpoint or damaged, or has not so many moved cameras, InvalidArgument where its fingerprint is another.
 ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
-                           const Smoothing& finest);
+                           const Smoothing& finest, std::size_t cameras = 0);
 
 }  // namespace dpr

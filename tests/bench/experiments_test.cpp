@@ -186,4 +186,18 @@ TEST_SUITE("bench-smoke") {
     }
     CHECK(data["rows"][0]["iou"].get<double>() > 0.85);
   }
+
+  TEST_CASE("cameras: what wrong ones cost, refining them brings back in part") {
+    const TempDir folder;
+    const Json data = run_without_picture(folder, "cameras");
+    if (data.is_null()) return;
+    REQUIRE(data["rows"].size() == 4);
+    for (const char* const quality : {"iou", "held_out_psnr"}) {
+      CAPTURE(quality);
+      const auto of = [&](std::size_t row) { return data["rows"][row][quality].get<double>(); };
+      const double right = of(0), off = of(2), refined = of(3);
+      CHECK(off < right);
+      CHECK(refined > off);
+    }
+  }
 }

@@ -1,6 +1,7 @@
 // dpr fit as a user runs it: mesh, report and checkpoint; and one line for whatever is wrong.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -232,6 +233,47 @@ TEST_SUITE("pipeline") {
 }
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("dpr fit --refine-cameras moves cameras, and writes a views file that has them") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    views["background"] = {0, 0, 0};
+    views["views"][1].erase("camera");
+    views["views"][1]["camera"] = camera("[[0.01,0,1,0],[0,1,0,0.05],[-1,0,0.01,-5],[0,0,0,1]]");
+    folder.write("views.json", views.dump());
+    std::filesystem::create_directories(folder / "found");
+    const auto fit = [&](const std::string& file, const std::vector<std::string>& more) {
+      const auto outcome = run_command(
+          folder,
+          with({"fit", "--views", file, "-o", "mesh.obj", "--levels", "1", "--iterations", "6"}, more));
+      CAPTURE(outcome.err);
+      REQUIRE(outcome.status == 0);
+    };
+    fit("views.json", {"--refine-cameras", "--size", "12x12", "--save-views", "found/views.json"});
+    json found = json::parse(folder.read("found/views.json"));
+    CHECK(found["views"][0]["image"] == "../view0.exr");
+    for (std::size_t i = 0; i < 3; ++i) {
+      json &now = found["views"][i]["camera"]["view"], &before = views["views"][i]["camera"]["view"];
+      double most = 0;
+      for (std::size_t row = 0; row < 4; ++row) {
+        for (std::size_t column = 0; column < 4; ++column) {
+          const double difference = now[row][column].get<double>() - before[row][column].get<double>();
+          most = std::max(most, std::abs(difference));
+        }
+      }
+      CHECK(most > 1e-3);
+      CHECK(most < 0.5);
+      now = before;
+      found["views"][i]["image"] = views["views"][i]["image"];
+    }
+    CHECK(found == views);  // nothing else has changed
+    fit("found/views.json", {"--save-views", "again.json"});
+    const json again = json::parse(folder.read("again.json"));
+    CHECK(again["views"][2]["camera"] ==
+          json::parse(folder.read("found/views.json"))["views"][2]["camera"]);  // they stay
+    CHECK(again["views"][2]["image"] == "view2.exr");
+  }
+
   TEST_CASE(
       "dpr fit on parts of the CPU is that on the whole with chunks as large; a checkpoint goes on there") {
     if (is_skipped() || !dpr::test::is_divisible(dpr::open_device("cpu"))) return;
@@ -290,6 +332,10 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--blur", "0"}), "--blur (command line)");
     fails(good, with(k_short, {"--edge", "-1"}), "--edge (command line)");
     fails(good, with(k_short, {"--blur-end", "0"}), "--blur-end (command line)");
+    fails(good, with(k_short, {"--camera-learning-rate", "0"}), "--camera-learning-rate (command line)");
+    fails(good, with(k_short, {"--save-views", "nowhere/views.json"}), "nowhere");
+    fails(changed([](json& v) { v["views"] = json::array({v["views"][0]}); }),
+          with(k_short, {"--refine-cameras"}), "at least two");
     fails(good, with(k_short, {"--laplacian", "-1"}), "weight");
     fails(good, {"fit", "--views", "views.json", "-o", "mesh.stl"}, "mesh.stl");
     fails(good, {"fit", "--views", "views.json", "-o", "nowhere/mesh.obj"}, "nowhere");
@@ -328,7 +374,8 @@ TEST_SUITE("robustness") {
     const json known = views["views"][0]["camera"];
     views["views"] = json::array({{{"image", "view0.exr"}, {"initial_camera", known}}});
     folder.write("views.json", views.dump());
-    const auto arguments = with(k_short, {"--initial", "cube.ply", "--ssim", "0", "--report", "report"});
+    const auto arguments = with(k_short, {"--initial", "cube.ply", "--ssim", "0", "--report", "report",
+                                          "--save-views", "found.json"});
     const auto outcome = run_command(folder, arguments);
     CAPTURE(outcome.err);
     REQUIRE(outcome.status == 0);
@@ -339,6 +386,9 @@ TEST_SUITE("robustness") {
     CHECK(data["lights"]["harmonics"] == data["harmonics"]);
     REQUIRE(data["cameras"].size() == 1);
     CHECK(std::abs(data["cameras"][0]["fov_y_degrees"].get<double>() - 50) < 5);
+    const json found = json::parse(folder.read("found.json"))["views"][0];
+    CHECK_FALSE(found.contains("initial_camera"));
+    CHECK(found["camera"]["fov_y_degrees"] == data["cameras"][0]["fov_y_degrees"]);
     const auto refused = run_command(folder, with(arguments, {"--light", "gain"}));
     CHECK(refused.status == 1);
     CHECK(contains(refused.err, "--light"));
