@@ -20,9 +20,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string six_digits(std::uint64_t number) {
-  const std::string digits = std::to_string(number);
-  return std::string(digits.size() < 6 ? 6 - digits.size() : 0, '0') + digits;
+/// Of images and objects in the names of files.
+std::string six_digits(std::uint64_t number) { return padded(number, 6); }
+
+/// A scene's folder, without a slash at the end.
+fs::path scene_folder(const std::string& folder) {
+  return fs::absolute(fs::path(folder) / "").lexically_normal().parent_path();
 }
 
 std::vector<float> numbers(const JsonNode& node, std::size_t count) {
@@ -79,9 +82,8 @@ Pose truth_of(const JsonNode& objects, std::uint64_t wanted) {
 
 /// The model, about whose origin all vertices are within the radius.
 Mesh read_model(const BopOptions& options, Notes& notes, double& radius) {
-  const fs::path data = fs::absolute(fs::path(options.folder) / "").lexically_normal().parent_path();
-  const fs::path models =
-      options.models.empty() ? data.parent_path().parent_path() / "models" : fs::path(options.models);
+  const fs::path data = scene_folder(options.folder).parent_path().parent_path();
+  const fs::path models = options.models.empty() ? data / "models" : fs::path(options.models);
   Mesh mesh = read_mesh(models / ("obj_" + six_digits(options.object) + ".ply"), notes);
   radius = 0;
   for (const glm::vec3& p : mesh.positions) radius = std::max(radius, glm::length(glm::dvec3(p)));
@@ -126,8 +128,7 @@ Scene bop_scene(const BopOptions& options, const BopImage& image, glm::ivec2 siz
 }
 
 std::uint64_t bop_scene_number(const std::string& folder) {
-  const std::string name =
-      fs::absolute(fs::path(folder) / "").lexically_normal().parent_path().filename().string();
+  const std::string name = scene_folder(folder).filename().string();
   std::uint64_t number = 0;
   const char *const begin = name.data(), *const end = begin + name.size();
   if (from_chars(begin, end, number).ptr == end && !name.empty()) return number;

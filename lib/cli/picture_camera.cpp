@@ -35,13 +35,10 @@ void take_exif_focal(Scene& scene, float focal_35mm, const std::string& file, No
   Camera& camera = scene.camera;
   if (camera.orthographic_height)
     throw InvalidArgument("--exif-focal (command line)", "an orthographic scene", "a perspective one");
-  const double width = scene.width, height = scene.height;
-  const double wanted = static_cast<double>(focal_35mm) / k_film_diagonal * std::hypot(width, height);
-  const double given =
-      camera.intrinsics
-          ? static_cast<double>(camera.intrinsics->fy)
-          : 0.5 * height / std::tan(0.5 * glm::radians(static_cast<double>(camera.fov_y_degrees)));
-  camera = zoomed(camera, wanted / given);
+  const double wanted =
+      static_cast<double>(focal_35mm) / k_film_diagonal * std::hypot(scene.width, scene.height);
+  const float given = in_pixels(camera, scene.width, scene.height).intrinsics->fy;
+  camera = zoomed(camera, wanted / static_cast<double>(given));
   notes.push_back(file + " has a focal length of " + checks::text(focal_35mm) +
                   " mm (35-mm film), which the camera takes");
 }

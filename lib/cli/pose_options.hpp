@@ -11,7 +11,7 @@ namespace dpr::cli {
 /// Least squares as the command line describes them.
 struct LeastSquaresOptions {
   LeastSquares method;
-  std::string light = "harmonics", mask;  ///< the mask is a file
+  std::string light = "harmonics", mask{};  ///< the mask is a file
 };
 
 void add_least_squares_options(CLI::App& command, const char* group, LeastSquaresOptions& options);

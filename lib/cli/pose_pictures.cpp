@@ -39,8 +39,7 @@ Image read_depth(const std::string& file, std::optional<float> scale) {
 
 Image scaled_depth(Image depth, glm::ivec2 size) {
   constexpr float k_most = 0.5F;  // of a pixel's area
-  for (glm::vec4& pixel : depth.pixels)
-    pixel.w = pixel.w > 0 && pixel.x != 0 && std::isfinite(pixel.x) ? 1 : 0;
+  for (glm::vec4& pixel : depth.pixels) pixel.w = has_depth(pixel) ? 1 : 0;
   depth = resample_medians(depth, size.x, size.y);
   for (glm::vec4& pixel : depth.pixels) pixel = pixel.w >= k_most ? glm::vec4(pixel.x) : glm::vec4(0);
   return depth;

@@ -10,8 +10,9 @@
 #include <system_error>
 #include <utility>
 
-#include "base/checks.hpp"
 #include "base/input_file.hpp"
+#include "cli/target.hpp"
+#include "cli/text.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -36,8 +37,6 @@ bool is_image(const std::filesystem::path& file) {
   return has_extension(file, extensions);
 }
 
-std::string named(const std::string& name) { return "--sequence " + name + " (command line)"; }
-
 /// Entries of a folder that hold images, in natural order.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   std::error_code error;
@@ -59,10 +58,7 @@ struct NumberedName {
   std::string prefix, suffix;
   std::size_t width = 0;  ///< least number of digits
 
-  std::string with(std::uint64_t number) const {
-    const std::string digits = std::to_string(number);
-    return prefix + std::string(width > digits.size() ? width - digits.size() : 0, '0') + digits + suffix;
-  }
+  std::string with(std::uint64_t number) const { return prefix + padded(number, width) + suffix; }
   /// The number of a name that with() would make.
   std::optional<std::uint64_t> number_of(const std::string& name) const {
     if (name.size() <= prefix.size() + suffix.size() || !name.starts_with(prefix) || !name.ends_with(suffix))
@@ -120,7 +116,8 @@ std::vector<std::filesystem::path> files_of(const std::string& name) {
   const std::filesystem::path path(name);
   if (std::filesystem::is_directory(path)) {
     std::vector<std::filesystem::path> files = images_in(path);
-    if (files.empty()) throw InvalidArgument(named(name), "a folder without images", "images in it");
+    if (files.empty())
+      throw InvalidArgument(named("--sequence", name), "a folder without images", "images in it");
     return files;
   }
   if (std::filesystem::exists(path)) return {path};
@@ -128,7 +125,7 @@ std::vector<std::filesystem::path> files_of(const std::string& name) {
   if (!numbered) return {path};  // not there, which is an error when its turn comes
   std::vector<std::filesystem::path> files = numbered_files(path, *numbered);
   if (files.empty()) {
-    throw InvalidArgument(named(name), "no file that matches",
+    throw InvalidArgument(named("--sequence", name), "no file that matches",
                           "a file, a folder, or a pattern such as frames/%04d.png of files that are there");
   }
   return files;
@@ -160,7 +157,7 @@ bool is_naturally_less(const std::string& a, const std::string& b) {
 }
 
 Sequence::Sequence(const std::vector<std::string>& names, Encoding encoding, const Scene& scene)
-    : encoding_(encoding), width_(scene.width), height_(scene.height) {
+    : encoding_(encoding), size_of_frames_(scene.width, scene.height) {
   for (const std::string& name : names) {
     for (std::filesystem::path& file : files_of(name)) files_.push_back(std::move(file));
   }
@@ -194,10 +191,7 @@ std::optional<SequenceFrame> Sequence::next_of_video() {
 }
 
 SequenceFrame Sequence::checked(std::string file, Image image) const {
-  if (image.width != width_ || image.height != height_) {
-    throw InvalidArgument("size of " + named(file), checks::size(image.width, image.height),
-                          checks::size(width_, height_) + ", the scene's");
-  }
+  require_size(image, size_of_frames_, named("--sequence", file));
   return {std::move(file), std::move(image)};
 }
 

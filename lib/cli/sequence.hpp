@@ -42,7 +42,7 @@ class Sequence {
 
   std::deque<std::filesystem::path> files_;
   Encoding encoding_;
-  int width_, height_;
+  glm::ivec2 size_of_frames_;
   std::optional<std::size_t> size_;
   std::optional<Video> video_;  // that is being read, the first of the files
   std::size_t video_frame_ = 0;

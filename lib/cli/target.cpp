@@ -11,6 +11,12 @@ std::string named(const char* option, const std::string& file) {
   return std::string(option) + " " + file + " (command line)";
 }
 
+void require_size(const Image& image, glm::ivec2 size, const std::string& name) {
+  if (image.width == size.x && image.height == size.y) return;
+  throw InvalidArgument("size of " + name, checks::size(image.width, image.height),
+                        checks::size(size.x, size.y) + ", the scene's");
+}
+
 bool has_silhouette(const Image& image) {
   return std::ranges::any_of(image.pixels, [](const glm::vec4& p) { return p.a < 1; });
 }
@@ -28,9 +34,8 @@ Image read_target(const std::string& file, const LossWeights& weights, Encoding 
                   const Scene& scene) {
   PixelFacts facts;
   Image target = read_target(file, weights, encoding, facts);
-  if (target.width == scene.width && target.height == scene.height) return target;
-  throw InvalidArgument("size of " + named("--target", file), checks::size(target.width, target.height),
-                        checks::size(scene.width, scene.height) + ", the scene's");
+  require_size(target, {scene.width, scene.height}, named("--target", file));
+  return target;
 }
 
 }  // namespace dpr::cli

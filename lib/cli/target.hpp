@@ -13,6 +13,9 @@ namespace dpr::cli {
 /// "--target FILE (command line)": what messages call an option's file.
 std::string named(const char* option, const std::string& file);
 
+/// Throws InvalidArgument where an image that messages call `name` has another size than the scene's.
+void require_size(const Image& image, glm::ivec2 size, const std::string& name);
+
 /// True if a pixel has an alpha below 1.
 bool has_silhouette(const Image& image);
 

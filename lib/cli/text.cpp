@@ -24,6 +24,11 @@ bool take(const char*& at, const char* end, Number& number, char follower) {
 
 }  // namespace
 
+std::string padded(std::uint64_t number, std::size_t digits) {
+  const std::string text = std::to_string(number);
+  return std::string(text.size() < digits ? digits - text.size() : 0, '0') + text;
+}
+
 glm::ivec2 parse_size(const std::string& text) {
   const char *at = text.data(), *end = at + text.size();
   glm::ivec2 size(0);

@@ -1,6 +1,7 @@
 // Values as text: for people, and from the command line.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <glm/glm.hpp>
@@ -15,6 +16,9 @@ std::string format(const char* pattern, Values... values) {
   std::snprintf(text, sizeof text, pattern, values...);
   return text;
 }
+
+/// A number with at least so many digits: "0042".
+std::string padded(std::uint64_t number, std::size_t digits);
 
 /// "640x480". Throws InvalidArgument.
 glm::ivec2 parse_size(const std::string& text);

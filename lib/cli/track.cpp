@@ -1,10 +1,10 @@
 // dpr track: an object's poses in a sequence of images.
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <memory>
 #include <optional>
 
+#include "base/clock.hpp"
 #include "base/output_file.hpp"
 #include "cli/commands.hpp"
 #include "cli/option_names.hpp"
@@ -27,15 +27,9 @@ const char* const k_method_group = "Least squares";
 struct TrackCommandOptions {
   std::string scene, initial_rotation, output, csv, report;
   std::vector<std::string> sequence;
-  LeastSquaresOptions least_squares;
+  LeastSquaresOptions least_squares{.method = TrackOptions().method};
   TrackOptions tracker;
 };
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// A run: the frames so far.
 class Run {
@@ -114,7 +108,6 @@ void run(const CLI::App& command, TrackCommandOptions& options, const CommonOpti
   options.tracker.method = read_least_squares(command, options.least_squares);
   const std::string& mask = options.least_squares.mask;
   if (!mask.empty()) options.tracker.method.mask = read_image(mask, nullptr, Encoding::linear);
-  options.tracker.method.noise = TrackOptions().method.noise;
   Scene scene = read_scene(options.scene, common);
   if (!options.initial_rotation.empty() && scene.meshes.size() == 1) {
     glm::mat4& transform = scene.meshes.front().transform;

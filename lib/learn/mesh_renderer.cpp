@@ -3,10 +3,10 @@
 #include <torch/csrc/autograd/custom_function.h>
 #include <torch/custom_class.h>
 
-#include <chrono>
 #include <string>
 #include <utility>
 
+#include "base/clock.hpp"
 #include "batch/batch.hpp"
 
 namespace dpr::learn {
@@ -14,7 +14,6 @@ namespace {
 
 using torch::autograd::AutogradContext;
 using torch::autograd::variable_list;
-using Clock = std::chrono::steady_clock;
 
 /// Adds the time that an action takes; the library's errors become torch's.
 template <typename Action>
@@ -22,7 +21,7 @@ auto timed(double& seconds, const Action& action) {
   const Clock::time_point start = Clock::now();
   try {
     auto result = action();
-    seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    seconds += seconds_since(start);
     return result;
   } catch (const Error& error) {
     throw RenderError(error);

@@ -1,7 +1,6 @@
 // The training loop: a step is a function of the options, the data and its number.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -9,6 +8,7 @@
 #include <random>
 
 #include "base/checks.hpp"
+#include "base/clock.hpp"
 #include "base/name_list.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
@@ -24,13 +24,7 @@
 namespace dpr::learn {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::string_view k_without_gradients = "rigid";
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Images of a step's objects, and another view of each.
 struct Batch {

@@ -2,9 +2,9 @@
 #include "multi_device/multi_device_impl.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <thread>
 
+#include "base/clock.hpp"
 #include "dpr/error.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "renderer/renderer_impl.hpp"
@@ -17,8 +17,6 @@ namespace {
 /// together, few enough for a chunk to fill a device.
 constexpr std::size_t k_chunks = 12;
 
-using Clock = std::chrono::steady_clock;
-
 /// A thread whose destructor waits for its end: std::jthread, which libc++ before 20 lacks.
 struct Thread : std::thread {
   using std::thread::thread;
@@ -27,10 +25,6 @@ struct Thread : std::thread {
     if (joinable()) join();
   }
 };
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 }  // namespace
 

@@ -1,13 +1,13 @@
 // The pose solver's public face: checks what it is given and hands it to a method.
 #include "dpr/pose.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <string>
 #include <utility>
 #include <variant>
 
 #include "base/checks.hpp"
+#include "base/clock.hpp"
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_descent.hpp"
@@ -35,10 +35,10 @@ const LeastSquares& require_least_squares(const PoseOptions& options, const char
 
 template <typename Work>
 PoseResult timed(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   PoseResult result = work();
   result.iterations = static_cast<unsigned>(result.history.size());
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = seconds_since(start);
   return result;
 }
 

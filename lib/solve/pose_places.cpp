@@ -8,6 +8,7 @@
 
 #include "solve/polar.hpp"
 #include "solve/pose_window.hpp"
+#include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {
@@ -146,10 +147,8 @@ PosePlaces::PosePlaces(const Scene& scene, const PoseOptions& options, const Pos
   box_.emplace(scene, *box);
   std::vector<Hypothesis> guesses = grid(k_enough);
   const auto middle = guesses.begin() + std::ssize(guesses) / 2;
-  const glm::dmat4 view(scene.camera.view);
-  std::ranges::nth_element(guesses, middle, {}, [&](const Hypothesis& h) {
-    return -(view * glm::dvec4(h.pose.translation, 1)).z;
-  });
+  std::ranges::nth_element(guesses, middle, {},
+                           [&](const Hypothesis& h) { return view_depth(scene.camera, h.pose.translation); });
   about_.translation = middle->pose.translation;
 }
 
@@ -170,7 +169,7 @@ std::vector<Hypothesis> PosePlaces::grid(std::size_t rotations) const {
 /// The places of a grid over the picture, at several distances, of which some rotation leaves least.
 std::vector<glm::dvec3> PosePlaces::best_of_picture(PoseLevel& level) const {
   constexpr std::size_t k_hypotheses = 12000, k_least_rotations = 8, k_most_rotations = 72;
-  const double start = -(glm::dmat4(scene_.camera.view) * glm::dvec4(start_.translation, 1)).z;
+  const double start = view_depth(scene_.camera, start_.translation);
   const double distance = std::max(start, static_cast<double>(scene_.camera.znear) + radius_);
   std::vector<glm::dvec3> places;
   for (const double factor : {1.0, std::numbers::sqrt2 / 2, std::numbers::sqrt2, 0.5, 2.0}) {

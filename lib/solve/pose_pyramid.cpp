@@ -8,6 +8,7 @@
 #include "base/checks.hpp"
 #include "solve/levenberg_marquardt.hpp"
 #include "solve/pose_window.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr {
 
@@ -42,10 +43,6 @@ void validate_depth(const Image& depth, const Camera& camera) {
 
 bool has_observations(const LeastSquares& options) {
   return !is_empty(options.silhouette.image) || !is_empty(options.depth.image);
-}
-
-bool has_depth(const glm::vec4& pixel) {
-  return pixel.w > 0 && pixel.x != 0 && std::isfinite(pixel.x) && std::isfinite(pixel.w);
 }
 
 void require_size(const Image& image, const Scene& scene, const std::string& name) {

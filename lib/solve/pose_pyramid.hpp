@@ -16,8 +16,6 @@ void require_size(const Image& image, const Scene& scene, const std::string& nam
 
 /// True if there is a silhouette or a depth.
 bool has_observations(const LeastSquares& options);
-/// True if a pixel of a depth image has one.
-bool has_depth(const glm::vec4& pixel);
 
 /// From coarse to fine: the resolution doubles; the last level is the finest once more, with the final blur.
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options);

@@ -61,6 +61,10 @@ Image resample_weighted(Image image, int width, int height) {
   return result;
 }
 
+bool has_depth(const glm::vec4& pixel) {
+  return pixel.w > 0 && pixel.x != 0 && std::isfinite(pixel.x) && std::isfinite(pixel.w);
+}
+
 Image resample_medians(const Image& image, int width, int height) {
   Image result(width, height);
   std::vector<float> numbers;
@@ -84,6 +88,10 @@ Image resample_medians(const Image& image, int width, int height) {
     }
   }
   return result;
+}
+
+double view_depth(const Camera& camera, const glm::dvec3& point) {
+  return -(glm::dmat4(camera.view) * glm::dvec4(point, 1.0)).z;
 }
 
 Camera in_pixels(Camera camera, int width, int height) {

@@ -1,4 +1,4 @@
-// Images and cameras at another resolution.
+// Images and cameras at another resolution; depths.
 #pragma once
 
 #include "dpr/camera.hpp"
@@ -13,9 +13,15 @@ Image resample(const Image& image, int width, int height);
 /// The same of numbers that count by their alpha: the means of what counts, and of how much it does.
 Image resample_weighted(Image image, int width, int height);
 
+/// True if a pixel of a depth image has one.
+bool has_depth(const glm::vec4& pixel);
+
 /// Medians of the first channel over the areas of new pixels, among those that have an alpha above 0; alpha is
 /// the part of the area that has. Means would mix what lies before an edge with what lies behind it.
 Image resample_medians(const Image& image, int width, int height);
+
+/// How far a point of the world lies in front of a camera, along its axis.
+double view_depth(const Camera& camera, const glm::dvec3& point);
 
 /// The perspective camera with intrinsics, for images of that size.
 Camera in_pixels(Camera camera, int width, int height);

@@ -2,13 +2,13 @@
 #include "dpr/shape.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "base/clock.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/multi_device.hpp"
 #include "loss/image_loss_impl.hpp"
@@ -305,7 +305,7 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
 unsigned ShapeSolver::most_iterations() const { return options_.levels * options_.iterations; }
 
 ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::path& checkpoint) const {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   ShapeState state;
   state.faces = start_.faces;
   state.positions = flat(start_.positions);
@@ -330,7 +330,7 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
   return {start_,
           end.mesh(),
           end.iteration == most_iterations(),
-          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
+          seconds_since(start),
           end.history,
           moved_cameras(views_, end.cameras)};
 }

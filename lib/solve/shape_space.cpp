@@ -7,6 +7,7 @@
 
 #include "base/checks.hpp"
 #include "mesh/bounding_box.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr {
 namespace {
@@ -60,7 +61,7 @@ CommonView common_view(const ShapeViews& views) {
   for (std::size_t i = 0; i < views.views.size(); ++i) {
     const Camera& camera = views.views[i].camera;
     const Projection p = projection(camera, views.width, views.height);
-    const double depth = -(glm::dmat4(camera.view) * glm::dvec4(common.centre, 1.0)).z;
+    const double depth = view_depth(camera, common.centre);
     if (!(depth > camera.znear && depth < camera.zfar)) {
       throw InvalidArgument(
           checks::element("views", i) + ".camera (shape)",

@@ -4,16 +4,16 @@
 #include <cmath>
 
 #include "solve/pose_pyramid.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr {
 
 TrackLevels::TrackLevels(const Device& device, const Scene& scene, const PoseOptions& options,
                          const FittedPose& first, const Pose& near, const Image& frame)
     : space_(scene, near, options),
-      view_(scene.camera.view),
-      near_depth_(depth_of(near)),
+      camera_(scene.camera),
+      near_depth_(view_depth(camera_, near.translation)),
       unexplained_part_(first.unexplained_part),
-      is_orthographic_(scene.camera.orthographic_height.has_value()),
       frame_(&frame) {
   const auto& method = std::get<LeastSquares>(options.method);
   std::vector<LevelShape> shapes = level_shapes(scene, method);
@@ -50,14 +50,10 @@ double TrackLevels::unexplained(std::size_t level) {
   return found.unexplained;
 }
 
-double TrackLevels::depth_of(const Pose& pose) const {
-  return -(view_ * glm::dvec4(pose.translation, 1.0)).z;
-}
-
 bool TrackLevels::suits(const Pose& pose) const {
   constexpr double k_most = 1.5;
-  const double ratio = depth_of(pose) / near_depth_;
-  return is_orthographic_ || (ratio > 1 / k_most && ratio < k_most);
+  const double ratio = view_depth(camera_, pose.translation) / near_depth_;
+  return camera_.orthographic_height.has_value() || (ratio > 1 / k_most && ratio < k_most);
 }
 
 }  // namespace dpr

@@ -38,12 +38,9 @@ class TrackLevels {
     double unexplained = -1;  // of the frame; below 0: not known
   };
 
-  double depth_of(const Pose& pose) const;
-
   PoseSpace space_;
-  glm::dmat4 view_;
+  Camera camera_;
   double near_depth_, unexplained_part_;
-  bool is_orthographic_;
   std::vector<std::unique_ptr<Level>> levels_;
   const Image* frame_;
 };

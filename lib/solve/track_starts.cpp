@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "solve/pose_beam.hpp"
+#include "solve/resample.hpp"
 
 namespace dpr {
 namespace {
@@ -67,7 +68,7 @@ std::vector<Hypothesis> hypotheses_everywhere(const glm::dvec3& place, const Pos
                                               const Scene& scene, std::size_t rotations,
                                               bool solves_translation) {
   std::vector<glm::dvec3> places{place};
-  const double depth = -(glm::dmat4(scene.camera.view) * glm::dvec4(place, 1.0)).z;
+  const double depth = view_depth(scene.camera, place);
   if (solves_translation && depth > static_cast<double>(scene.camera.znear)) {
     for (const glm::dvec2& ndc : lattice(scene, space.radius_ndc()))
       places.push_back(seen_at(scene, ndc, depth));

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <glm/glm.hpp>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -19,13 +18,9 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
+using dpr::test::run_line;
 using dpr::test::TempDir;
 using nlohmann::json;
-
-Outcome run(const TempDir& folder, const std::string& arguments) {
-  std::istringstream words(arguments);
-  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
-}
 
 /// From object to camera in OpenCV's axes: x right, y down, z forward; millimetres.
 const dpr::Pose k_truth{dpr::rotation_from_vector({0.6, -1.1, 0.4}), {60, -45, 620}};
@@ -56,8 +51,9 @@ void write_data(const TempDir& folder) {
       {"camera", {{"intrinsics", {{"fx", 210}, {"fy", 205}, {"cx", 76.5}, {"cy", 64.5}}}, {"zfar", 2000}}},
       {"meshes", {{{"file", "data/models/obj_000005.ply"}, {"transform", transform}}}}};
   folder.write("own.json", scene.dump());
-  REQUIRE(run(folder, "render --scene own.json --preset rigid -o data/test/000002/rgb/000003.png --quiet")
-              .status == 0);
+  REQUIRE(
+      run_line(folder, "render --scene own.json --preset rigid -o data/test/000002/rgb/000003.png --quiet")
+          .status == 0);
   // Pixels from the first one's centre.
   const json camera{{"3", {{"cam_K", {210, 0, 76, 0, 205, 64, 0, 0, 1}}, {"depth_scale", 0.1}}}};
   folder.write("data/test/000002/scene_camera.json", camera.dump());
@@ -81,9 +77,8 @@ TEST_SUITE("pipeline") {
         dpr::vector_from_rotation(dpr::rotation_from_vector({0.1, 0.15, -0.1}) * k_truth.rotation);
     std::ostringstream vector;
     vector << start.x << "," << start.y << "," << start.z;
-    REQUIRE(
-        run(folder, k_image + "--rotations 0 --initial-rotation " + vector.str() + " -o pose.json").status ==
-        0);
+    REQUIRE(run_line(folder, k_image + "--rotations 0 --initial-rotation " + vector.str() + " -o pose.json")
+                .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     CHECK(pose["explained"] == true);
     CHECK(pose["angle_error_degrees"]["start"].get<double>() > 8);
@@ -95,7 +90,7 @@ TEST_SUITE("pipeline") {
 
     // Without the reference, from a detector's box.
     std::filesystem::remove(folder / "data/test/000002/scene_gt.json");
-    REQUIRE(run(folder, k_image + "--search --box 55,10,90,90 -o result.csv").status == 0);
+    REQUIRE(run_line(folder, k_image + "--search --box 55,10,90,90 -o result.csv").status == 0);
     std::istringstream lines(folder.read("result.csv"));
     std::string head, field;
     std::getline(lines, head);
@@ -121,7 +116,7 @@ TEST_SUITE("robustness") {
     write_data(folder);
     const auto check = [&](const std::string& options, const char* says) {
       CAPTURE(options);
-      const Outcome outcome = run(folder, "pose --quiet " + options);
+      const Outcome outcome = run_line(folder, "pose --quiet " + options);
       CAPTURE(outcome.err);
       CHECK(outcome.status == 1);
       CHECK(dpr::test::is_error_line(outcome.err));

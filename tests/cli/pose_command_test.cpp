@@ -4,9 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 
 #include "dpr/image.hpp"
@@ -19,14 +17,9 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
+using dpr::test::run_line;
 using dpr::test::TempDir;
 using nlohmann::json;
-
-/// Runs `dpr ARGUMENTS` in the folder; spaces part the arguments.
-Outcome run(const TempDir& folder, const std::string& arguments) {
-  std::istringstream words(arguments);
-  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
-}
 
 /// scene.json, and target.exr: the cube turned by 0.8 radians about y.
 void write_inputs(const TempDir& folder) {
@@ -39,7 +32,7 @@ void write_inputs(const TempDir& folder) {
   };
   folder.write("scene.json", scene("[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"));
   folder.write("truth.json", scene("[[0.696707,0,0.717356,0],[0,1,0,0],[-0.717356,0,0.696707,0],[0,0,0,1]]"));
-  REQUIRE(run(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
+  REQUIRE(run_line(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
 }
 
 /// R[0][0] and R[0][2] of the truth are cos 0.8 and sin 0.8.
@@ -55,7 +48,7 @@ TEST_SUITE("pipeline") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    const Outcome search = run(
+    const Outcome search = run_line(
         folder,
         "pose --scene scene.json --target target.exr --search --translation -o pose.json --report report");
     REQUIRE(search.status == 0);
@@ -98,9 +91,9 @@ TEST_SUITE("pipeline") {
       truth["lights"]["harmonics"].push_back(
           {k == 0 ? 2.0 : 0.5 / k, k == 0 ? 1.5 : 0.2, k == 0 ? 1.0 : -0.1});
     folder.write("lit.json", truth.dump());
-    REQUIRE(run(folder, "render --scene lit.json --preset rigid -o target.exr --quiet").status == 0);
-    REQUIRE(run(folder, "pose --scene scene.json --target target.exr --search -o pose.json --quiet").status ==
-            0);
+    REQUIRE(run_line(folder, "render --scene lit.json --preset rigid -o target.exr --quiet").status == 0);
+    REQUIRE(run_line(folder, "pose --scene scene.json --target target.exr --search -o pose.json --quiet")
+                .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     REQUIRE(pose["light"] == "harmonics");
     REQUIRE(pose["harmonics"].size() == 9);
@@ -109,8 +102,8 @@ TEST_SUITE("pipeline") {
     CHECK(pose["lights"]["harmonics"] == pose["harmonics"]);
     found["lights"] = pose["lights"];
     folder.write("found.json", found.dump());
-    REQUIRE(run(folder, "render --scene found.json --preset rigid -o found.exr --quiet").status == 0);
-    REQUIRE(run(folder, "render --scene truth.json --preset rigid -o dark.exr --quiet").status == 0);
+    REQUIRE(run_line(folder, "render --scene found.json --preset rigid -o found.exr --quiet").status == 0);
+    REQUIRE(run_line(folder, "render --scene truth.json --preset rigid -o dark.exr --quiet").status == 0);
     const dpr::Image target = dpr::read_image(folder / "target.exr");
     const auto difference = [&](const char* file) {
       const dpr::Image image = dpr::read_image(folder / file);
@@ -131,9 +124,9 @@ TEST_SUITE("pipeline") {
     for (glm::vec4& pixel : target.pixels)
       pixel = glm::vec4(glm::vec3(gain) * glm::vec3(pixel) + glm::vec3(offset) * pixel.w, pixel.w);
     dpr::write_image(folder / "target.exr", target);
-    REQUIRE(run(folder,
-                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --light gain "
-                "-o pose.json --quiet")
+    REQUIRE(run_line(folder,
+                     "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --light gain "
+                     "-o pose.json --quiet")
                 .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
@@ -157,10 +150,10 @@ TEST_SUITE("pipeline") {
     const TempDir folder;
     write_inputs(folder);
     dpr::write_image(folder / "mask.png", dpr::Image(64, 48, glm::vec4(1)));
-    REQUIRE(run(folder,
-                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --mask mask.png "
-                "--robust 0.2 --focal --rotations 0 --coarsest 24 --level-iterations 12 --blur 0.3 "
-                "--blur-end 0.15 -o pose.json --quiet")
+    REQUIRE(run_line(folder,
+                     "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --mask mask.png "
+                     "--robust 0.2 --focal --rotations 0 --coarsest 24 --level-iterations 12 --blur 0.3 "
+                     "--blur-end 0.15 -o pose.json --quiet")
                 .status == 0);
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
@@ -169,9 +162,9 @@ TEST_SUITE("pipeline") {
     CHECK(pose["history"][0]["hypotheses"] == 1);
     CHECK(pose["history"][0]["height"] == 24);
     CHECK_FALSE(pose.contains("distortion"));
-    REQUIRE(run(folder,
-                "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --distortion "
-                "--rotations 0 --coarsest 24 -o lens.json --quiet")
+    REQUIRE(run_line(folder,
+                     "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --distortion "
+                     "--rotations 0 --coarsest 24 -o lens.json --quiet")
                 .status == 0);
     const json lens = json::parse(folder.read("lens.json"));
     check_is_truth(lens);
@@ -184,8 +177,9 @@ TEST_SUITE("pipeline") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    REQUIRE(run(folder, "render --scene truth.json --preset rigid -o seen.exr --aov depth --quiet").status ==
-            0);
+    REQUIRE(
+        run_line(folder, "render --scene truth.json --preset rigid -o seen.exr --aov depth --quiet").status ==
+        0);
     const dpr::Image depth = dpr::read_image(folder / "seen.depth.exr");
     std::string whole = "P5 64 48 65535\n";  // millimetres, most significant byte first
     for (const glm::vec4& pixel : depth.pixels) {
@@ -201,7 +195,8 @@ TEST_SUITE("pipeline") {
           "--target target.exr --silhouette target.exr --depth seen.depth.exr"}) {
       CAPTURE(options);
       REQUIRE(
-          run(folder,
+          run_line(
+              folder,
               std::string(
                   "pose --scene scene.json --initial-rotation 0,0.7,0 --rotations 0 -o pose.json --quiet ") +
                   options)
@@ -215,9 +210,9 @@ TEST_SUITE("pipeline") {
     const TempDir folder;
     write_inputs(folder);
     for (const char* option : {"--method descent", "--schedule anneal", "--sigma 1e-3"}) {
-      REQUIRE(run(folder, std::string("pose --scene scene.json --target target.exr --composition joint "
-                                      "--iterations 4 --restarts 0 -o pose.json --quiet ") +
-                              option)
+      REQUIRE(run_line(folder, std::string("pose --scene scene.json --target target.exr --composition joint "
+                                           "--iterations 4 --restarts 0 -o pose.json --quiet ") +
+                                   option)
                   .status == 0);
       const json pose = json::parse(folder.read("pose.json"));
       CHECK(pose["iterations"] == 4);
@@ -237,8 +232,8 @@ TEST_SUITE("robustness") {
           "--search --schedule anneal", "--mask target.exr --iterations 4", "--mask missing.png", "--blur 0",
           "--search --rotations 0", "--robust -1", "--device cpu/2"}) {
       CAPTURE(options);
-      const Outcome outcome =
-          run(folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options);
+      const Outcome outcome = run_line(
+          folder, std::string("pose --scene scene.json --target target.exr -o pose.json ") + options);
       CAPTURE(outcome.err);
       CHECK(outcome.status == 1);
       CHECK(dpr::test::is_error_line(outcome.err));
@@ -256,7 +251,7 @@ TEST_SUITE("robustness") {
     dpr::write_image(folder / "far.exr", dpr::Image(64, 48, glm::vec4(1e6F)));
     const auto check = [&](const std::string& options, const char* says) {
       CAPTURE(options);
-      const Outcome outcome = run(folder, "pose --scene scene.json -o pose.json " + options);
+      const Outcome outcome = run_line(folder, "pose --scene scene.json -o pose.json " + options);
       CAPTURE(outcome.err);
       CHECK(outcome.status == 1);
       CHECK(dpr::test::is_error_line(outcome.err));

@@ -5,9 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
-#include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <string>
 
 #include "dpr/mesh.hpp"
@@ -19,16 +17,11 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
+using dpr::test::run_line;
 using dpr::test::TempDir;
 using nlohmann::json;
 
 constexpr double k_angle = 0.8;  // of the truth, about y
-
-/// Runs `dpr ARGUMENTS` in the folder; spaces part the arguments.
-Outcome run(const TempDir& folder, const std::string& arguments) {
-  std::istringstream words(arguments);
-  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
-}
 
 /// A scene of the cube, turned by an angle about y, with a camera of a picture of 192x144.
 json scene_of(double angle) {
@@ -48,14 +41,15 @@ void write_inputs(const TempDir& folder) {
   truth["width"] = 192, truth["height"] = 144;
   folder.write("truth.json", truth.dump());
   folder.write("scene.json", scene_of(0.6).dump());
-  REQUIRE(run(folder, "render --scene truth.json --preset rigid -o target.exr --aov depth --quiet").status ==
-          0);
+  REQUIRE(
+      run_line(folder, "render --scene truth.json --preset rigid -o target.exr --aov depth --quiet").status ==
+      0);
 }
 
 /// Solves from 0.6 radians without trying other rotations; checks the result, and returns the pose file.
 json solve(const TempDir& folder, const std::string& options) {
   CAPTURE(options);
-  const Outcome outcome = run(folder, "pose --rotations 0 --quiet -o pose.json " + options);
+  const Outcome outcome = run_line(folder, "pose --rotations 0 --quiet -o pose.json " + options);
   CAPTURE(outcome.err);
   REQUIRE(outcome.status == 0);
   const json pose = json::parse(folder.read("pose.json"));
@@ -150,14 +144,16 @@ TEST_SUITE("pipeline") {
 
     dpr::write_image(folder / "plain.jpg", dpr::read_image(folder / "target.exr"));
     folder.write("photograph.jpg", with_focal(folder.read("plain.jpg"), 30));
-    REQUIRE(run(folder,
-                "pose --scene scene.json --target photograph.jpg --exif-focal --rotations 0 --size 32x24 "
-                "-o exif.json --quiet")
-                .status == 0);
+    REQUIRE(
+        run_line(folder,
+                 "pose --scene scene.json --target photograph.jpg --exif-focal --rotations 0 --size 32x24 "
+                 "-o exif.json --quiet")
+            .status == 0);
     const double fov = json::parse(folder.read("exif.json"))["camera"]["fov_y_degrees"].get<double>();
     // The height is three fifths of the diagonal.
     CHECK(std::tan(fov * std::acos(-1.0) / 360) == doctest::Approx(0.6 * 43.2666 / 2 / 30).epsilon(1e-4));
-    const Outcome none = run(folder, "pose --scene scene.json --target plain.jpg --exif-focal -o p.json");
+    const Outcome none =
+        run_line(folder, "pose --scene scene.json --target plain.jpg --exif-focal -o p.json");
     CHECK(none.status == 1);
     CHECK(dpr::test::is_error_line(none.err));
     CHECK(contains(none.err, "plain.jpg without Exif's FocalLengthIn35mmFilm"));
@@ -173,13 +169,13 @@ TEST_SUITE("robustness") {
     scene["camera"].erase("intrinsics");
     scene["width"] = scene["height"] = 64;
     folder.write("square.json", scene.dump());
-    Outcome outcome = run(folder, "pose --scene square.json --target target.exr -o pose.json");
+    Outcome outcome = run_line(folder, "pose --scene square.json --target target.exr -o pose.json");
     CHECK(outcome.status == 1);
     CHECK(dpr::test::is_error_line(outcome.err));
     CHECK(contains(outcome.err, "size of --target target.exr (command line): got 192x144, expected 64x64"));
     CHECK(contains(outcome.err, "--size 85x64"));
     dpr::write_image(folder / "mask.png", dpr::Image(50, 50, glm::vec4(1)));
-    outcome = run(folder, "pose --scene scene.json --target target.exr --mask mask.png -o pose.json");
+    outcome = run_line(folder, "pose --scene scene.json --target target.exr --mask mask.png -o pose.json");
     CHECK(contains(outcome.err, "size of --mask mask.png (command line): got 50x50, expected 192x144"));
     CHECK(contains(outcome.err, "the intrinsics hold for the scene's width and height"));
     CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -26,13 +25,13 @@ namespace {
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
+using dpr::test::run_line;
 using dpr::test::TempDir;
 using nlohmann::json;
 
 /// Runs `dpr track --scene scene.json ARGUMENTS` in the folder; spaces part the arguments.
 Outcome track(const TempDir& folder, const std::string& arguments) {
-  std::istringstream words("track --scene scene.json " + arguments);
-  return dpr::test::run_command(folder, {std::istream_iterator<std::string>(words), {}});
+  return run_line(folder, "track --scene scene.json " + arguments);
 }
 
 constexpr int k_first = 8, k_frames = 5;

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -72,7 +74,13 @@ inline Outcome run_command(const TempDir& folder, const std::vector<std::string>
   return run_program(program_path("DPR_CLI"), folder, arguments, environment);
 }
 
-/// The same, of what must succeed.
+/// Runs `dpr LINE` in the folder; spaces part the arguments.
+inline Outcome run_line(const TempDir& folder, const std::string& line) {
+  std::istringstream words(line);
+  return run_command(folder, {std::istream_iterator<std::string>(words), {}});
+}
+
+/// Runs `dpr ARGUMENTS`, which must succeed.
 inline Outcome succeed(const TempDir& folder, const std::vector<std::string>& arguments) {
   const Outcome outcome = run_command(folder, arguments);
   CAPTURE(outcome.err);

@@ -41,7 +41,7 @@ def _hinges(edge_of_side, across):
     return np.concatenate(edges), np.concatenate(corners)
 
 
-def _sum_at(values, indices, count):
+def sum_at(values, indices, count):
     """[..., count, 3]: sums of the rows of values [..., n, 3] that have the same index."""
     kind, shape = _arrays.module_of(values), (*values.shape[:-2], count, values.shape[-1])
     if kind == "torch":
@@ -82,7 +82,7 @@ class MeshLoss:
         self._require(vertices)
         a, b = self._edges.T
         count = vertices.shape[-2]
-        sums = _sum_at(vertices[..., b, :], a, count) + _sum_at(vertices[..., a, :], b, count)
+        sums = sum_at(vertices[..., b, :], a, count) + sum_at(vertices[..., a, :], b, count)
         degrees = np.zeros((count, 1), np.float32)
         degrees[:self._vertices, 0] = self._degrees
         has_ring, divisor = _like(vertices, degrees > 0), _like(vertices, np.maximum(degrees, 1))

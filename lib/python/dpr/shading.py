@@ -21,6 +21,7 @@ import torch
 from torch import Tensor
 
 from . import _arrays
+from ._losses import sum_at
 from ._renderer import Renderer
 from ._texture import texture as _texture
 
@@ -52,9 +53,7 @@ def _dot(a, b):
 
 def _gathered(of_corners, indices, count):
     """[..., count, C]: sums of [..., F, 3, C] by the corners' indices [F, 3]."""
-    of_corners = of_corners.flatten(-3, -2)
-    zero = of_corners.new_zeros((*of_corners.shape[:-2], count, of_corners.shape[-1]))
-    return zero.index_add(-2, indices.reshape(-1), of_corners)
+    return sum_at(of_corners.flatten(-3, -2), indices.reshape(-1), count)
 
 
 def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
