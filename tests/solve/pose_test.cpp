@@ -475,12 +475,12 @@ TEST_SUITE("robustness") {
   }
 
   TEST_CASE("a target without the object is never explained, wherever the object goes and in any light") {
+    if (is_reduced()) return;
     const dpr::Device device = dpr::open_device();
-    const int size = reduced(32, 8);
-    dpr::LeastSquares method = least_squares();
-    method.rotations = is_reduced() ? 2 : 8;
+    const int size = 32;
+    dpr::LeastSquares method;
+    method.rotations = 8;
     for (const float grey : {0.0F, 0.5F, 1.0F}) {
-      if (is_reduced() && grey != 0.5F) continue;
       for (const float height : {0.0F, 100.0F}) {  // in sight; out of it
         for (const dpr::PoseLight light : {dpr::PoseLight::fixed, dpr::PoseLight::harmonics}) {
           CAPTURE(grey);
