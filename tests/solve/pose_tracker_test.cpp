@@ -19,9 +19,9 @@ using namespace dpr;
 
 namespace {
 
-/// A body of some 5,000 triangles that looks different from every side: a sphere with bumps and colours.
-Mesh body() {
-  Mesh mesh = make_icosphere(test::reduced(4, 1));
+/// A body that looks different from every side: a sphere with bumps and colours.
+Mesh body(int level) {
+  Mesh mesh = make_icosphere(test::reduced(level, 1));
   mesh.vertex_colors.clear();
   for (glm::vec3& p : mesh.positions) {
     mesh.vertex_colors.push_back({0.5F + 0.4F * std::sin(3 * p.x + 1), 0.5F + 0.4F * std::sin(4 * p.y),
@@ -31,14 +31,15 @@ Mesh body() {
   return mesh;
 }
 
-Scene body_scene() {
+/// By default some 5,000 triangles.
+Scene body_scene(int size = 160, int level = 4) {
   Scene scene;
-  scene.width = scene.height = test::reduced(160, 16);
+  scene.width = scene.height = test::reduced(size, 16);
   scene.camera.view[3] = glm::vec4(0, 0, -5, 1);
   scene.camera.fov_y_degrees = 45;
   scene.camera.znear = 1;
   scene.camera.zfar = 20;
-  scene.meshes.push_back({body(), glm::mat4(1)});
+  scene.meshes.push_back({body(level), glm::mat4(1)});
   scene.lights.emplace();
   scene.lights->ambient = glm::vec3(0.4F);
   scene.lights->directional.push_back({.direction = {1, -1, -1}, .diffuse = glm::vec3(0.6F)});
@@ -119,7 +120,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("tracker: an object that is covered, or leaves, is reported lost, and found again") {
     if (test::is_reduced()) return;
     const Device device = open_device();
-    const Scene scene = body_scene();
+    const Scene scene = body_scene(96, 3);
     Film film(device, scene);
     TrackOptions options = near_start();
     options.covariance = true;
@@ -170,7 +171,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("tracker: an object that comes in late is found where nothing is known of its rotation") {
     if (test::is_reduced()) return;
     const Device device = open_device();
-    const Scene scene = body_scene();
+    const Scene scene = body_scene(96, 3);
     Film film(device, scene);
     TrackOptions options = near_start();
     options.search = true;
