@@ -119,7 +119,15 @@ class ArgumentsTest(unittest.TestCase):
                 np.testing.assert_allclose(profile(64, 48, blur=blur, **settings), expected, atol=1e-5)
             kept = dpr.Renderer(64, 48, blur=0.7, **settings)
             np.testing.assert_allclose(kept(*MESH, *cameras(1)), kept(*MESH, *cameras(1), sigma=sigma), atol=1e-5)
-        # Its width is a pixel.
+        # Of this preset, and by default, a pixel.
+        for size in ((64, 48), (192, 160)):
+            self.assertTrue(np.array_equal(profile(*size), profile(*size, blur=1)))
+        self.assertTrue(np.array_equal(profile(192, 160, preset="softras"),
+                                       profile(192, 160, preset="softras", sigma=1e-3)))
+        changed = dpr.Renderer(64, 48)
+        changed.sigma = 1e-3
+        changed.sigma = None
+        np.testing.assert_array_equal(changed(*MESH, *cameras(1)), dpr.Renderer(64, 48, blur=1)(*MESH, *cameras(1)))
         np.testing.assert_allclose(profile(64, 48, preset="opendr", blur=1), profile(64, 48, preset="opendr"), atol=1e-6)
         for wrong in ({"blur": 0.5, "sigma": 1e-3}, {"blur": -1}, {"blur": 0}, {"blur": float("inf")}, {"blur": "wide"}):
             with self.assertRaisesRegex((ValueError, TypeError), "blur"):

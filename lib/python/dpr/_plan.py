@@ -73,7 +73,7 @@ def power_of_blur(renderer_settings, width, height):
     distance = renderer_settings.get("distance")
     if distance is None:
         distance = "euclidean" if renderer_settings.get("preset") in _EUCLIDEAN else "squared"
-    return 2 / min(width, height), 1 if distance == "euclidean" else 2
+    return 2 / max(min(width, height), 1), 1 if distance == "euclidean" else 2
 
 
 def sigma_of_blur(blur, scale, power):

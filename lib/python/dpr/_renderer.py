@@ -30,7 +30,7 @@ class Renderer:
                     unless given), sigma, gamma, samples, ...; and
         blur        instead of sigma: the standard deviation of the edges' noise in pixels, so that
                     sigma = (2 blur / short side of the image)^2, in squared NDC, or the root of that with Euclidean
-                    distances. The default, sigma 1e-3, is a blur of 1 pixel at 64 pixels a side, of 4 at 256
+                    distances. 1 unless sigma or another preset than "pixel" is given
         znear, zfar world units, between which triangles are rendered. Left out, every view has powers of two around the
                     depths of its vertices, the near one at least 1/1024 of the far one. Triangles that reach beyond
                     zfar are dropped whole; at znear they are clipped.
@@ -59,7 +59,8 @@ class Renderer:
             _arrays.fail(ValueError, "blur", "blur and sigma", "one of them")
         width, height = (_pixels(name, given.pop(name)) for name in ("width", "height"))
         device, texts = given.pop("device", ""), []
-        for name, value in given.items():
+        has_blur = "sigma" in given or "blur" in given or given.get("preset") != "pixel"
+        for name, value in (given if has_blur else {**given, "blur": _DEFAULT_BLUR}).items():
             if name == "blur":
                 of_blur = _plan.power_of_blur(given, width, height)
                 name, value = "sigma", _plan.sigma_of_blur(value, *of_blur)
@@ -312,6 +313,7 @@ def _pixels(name, value):
     return int(value)
 
 
+_DEFAULT_BLUR = 1  # pixels, of the preset "pixel"
 _DEFAULTS = Renderer.__call__.__kwdefaults__
 _OF_A_CALL = tuple(_DEFAULTS)
 _OF_A_MESH = _OF_A_CALL[:_OF_A_CALL.index("background")]
