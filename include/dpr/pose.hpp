@@ -1,6 +1,7 @@
 // An object's pose from one image.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <span>
@@ -116,6 +117,11 @@ struct Descent {
 
 struct PoseOptions {
   std::variant<LeastSquares, Descent> method;
+  /// Entries of Scene::meshes that move, as one rigid body: the pose is that of the first, and the others keep their
+  /// places relative to it. The rest stand still where the scene has them, before the body or behind it: they are part
+  /// of every picture, and of the depths. In light that is found along with the pose they are seen in its mean over
+  /// all directions. Empty: the scene's only mesh.
+  std::vector<std::size_t> meshes{};
   /// The translation too. LeastSquares then turns about the middle of the mesh's bounding box, wherever its
   /// origin lies; without, about the origin.
   bool solve_translation = false;
@@ -175,14 +181,14 @@ struct PoseResult : PoseHypothesis {
   std::vector<PoseIteration> history;
 };
 
-/// Finds the pose of the scene's only mesh from one view.
+/// Finds the pose of an object of the scene from one view.
 class DPR_API PoseSolver {
  public:
   /// Called once an iteration; false stops the solver, which then returns the best so far.
   using Callback = std::function<bool(const PoseIteration&)>;
 
-  /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has not
-  /// exactly one mesh, its transform is singular, the sizes of target, mask, silhouette or depth differ from the
+  /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has several
+  /// meshes and the options do not say which move, the first one's transform is singular, the sizes of target, mask, silhouette or depth differ from the
   /// scene's, one of these says nothing, the box holds nothing of the image, or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 

@@ -12,6 +12,7 @@
 #include "cli/commands.hpp"
 #include "cli/option_names.hpp"
 #include "cli/picture_camera.hpp"
+#include "cli/pose_bodies.hpp"
 #include "cli/pose_options.hpp"
 #include "cli/pose_pictures.hpp"
 #include "cli/pose_report.hpp"
@@ -33,6 +34,7 @@ struct PoseCommandOptions {
   std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
                                                report;
   PosePictureFiles pictures;
+  std::vector<std::string> meshes;
   BopOptions bop;  // no folder: a scene
   std::optional<std::string> method, box;
   bool search = false, exif_focal = false;
@@ -212,6 +214,8 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
+  options.solver.meshes = parse_bodies(options.meshes, scene).front();
+  const PoseBody body(scene, options.solver.meshes);
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
@@ -222,15 +226,15 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   if (writes_csv(options)) {
     write_bop_result(options.output, options.bop, result);
   } else {
-    Json json = pose_to_json(scene, result, true_rotation);
-    add_light(json, device, scene, target, result, options.least_squares.method);
+    Json json = pose_to_json(scene, body, result, true_rotation);
+    add_light(json, device, scene, body, target, result, options.least_squares.method);
     write_json(options.output, json);
   }
   if (!options.report.empty()) {
     const std::string& source = bop ? options.bop.folder : options.scene;
     const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
-    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, target, result,
-                      common.quiet, true_rotation);
+    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, body, target,
+                      result, common.quiet, true_rotation);
   }
   if (common.quiet) return;
   print(command, options, result);
@@ -327,7 +331,7 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
 
 void add_pose_command(CLI::App& application, CommonOptions& common) {
   CLI::App* command = application.add_subcommand(
-      "pose", "Finds the pose of a scene's only mesh from one image, a silhouette or depths");
+      "pose", "Finds the pose of an object from one image, a silhouette or depths");
   const auto options = std::make_shared<PoseCommandOptions>();
   command->add_option("--scene", options->scene, "Scene file")->type_name("S.json");
   command
@@ -337,6 +341,14 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "the scene are scaled to its size (masks and depths by medians), a scene without width and height "
           "takes the picture's size")
       ->type_name("T.exr");
+  command
+      ->add_option(
+          "--mesh", options->meshes,
+          "Numbers of the scene's meshes, from 0, that move together as one object: the pose is that of the "
+          "first. The rest stand still as the scene has them, in front of the object or behind it. Needed "
+          "where the scene has several meshes")
+      ->allow_extra_args(false)
+      ->type_name("N[,N...]");
   add_camera_options(*command, *options);
   CLI::Option* initial =
       command

@@ -16,7 +16,6 @@
 #include "cli/scene_file.hpp"
 #include "cli/text.hpp"
 #include "dpr/renderer.hpp"
-#include "solve/polar.hpp"
 #include "solve/resample.hpp"
 #include "solve/scene_light.hpp"
 
@@ -25,16 +24,11 @@ namespace {
 
 constexpr std::size_t k_strip_length = 12;  // the start among them
 
-/// Scale in the scene's transform, beside rotation and translation.
-glm::dmat3 stretch_of(const Scene& scene) {
-  return polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch;
-}
-
-/// Renders the scene's mesh in any pose.
+/// Renders the scene with its body in any pose.
 class PoseCamera {
  public:
-  PoseCamera(const Device& device, Scene scene)
-      : renderer_(device), stretch_(stretch_of(scene)), camera_(scene.camera) {
+  PoseCamera(const Device& device, const Scene& scene, const PoseBody& body)
+      : renderer_(device), body_(body), camera_(scene.camera) {
     renderer_.set_scene(scene);
   }
 
@@ -47,7 +41,7 @@ class PoseCamera {
 
  private:
   Image render(const Camera& camera, const Pose& pose, const Smoothing& smoothing) {
-    const View view{camera, {affine(pose.rotation * stretch_, pose.translation)}};
+    const View view{camera, body_.transforms(pose)};
     renderer_.set_views({&view, 1});
     renderer_.set_smoothing(smoothing);
     renderer_.forward();
@@ -55,7 +49,7 @@ class PoseCamera {
   }
 
   Renderer renderer_;
-  glm::dmat3 stretch_;
+  const PoseBody& body_;
   Camera camera_;
 };
 
@@ -153,15 +147,21 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   };
 }
 
-Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene) {
+Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene, const PoseBody& body) {
   const Pose& pose = hypothesis.pose;
-  Json json{
-      {"rotation_matrix", rows_to_json(pose.rotation)},
-      {"rotation", to_json(vector_from_rotation(pose.rotation))},
-      {"translation", to_json(pose.translation)},
-      {"transform", rows_to_json(glm::dmat4(affine(pose.rotation * stretch_of(scene), pose.translation)))},
-      {"focal_scale", hypothesis.focal_scale},
-      {"loss", hypothesis.loss}};
+  const std::vector<glm::mat4> transforms = body.transforms(pose);
+  Json json{{"rotation_matrix", rows_to_json(pose.rotation)},
+            {"rotation", to_json(vector_from_rotation(pose.rotation))},
+            {"translation", to_json(pose.translation)},
+            {"transform", rows_to_json(glm::dmat4(transforms[body.first().mesh]))},
+            {"focal_scale", hypothesis.focal_scale},
+            {"loss", hypothesis.loss}};
+  if (scene.meshes.size() > 1) {
+    for (const BodyPart& part : body.parts()) {
+      json["meshes"].push_back(part.mesh);
+      json["transforms"].push_back(rows_to_json(glm::dmat4(transforms[part.mesh])));
+    }
+  }
   if (const auto& d = calibrated(scene.camera, 1, hypothesis.radial).distortion)
     json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
   return json;
@@ -178,8 +178,9 @@ Json covariance_to_json(const std::vector<double>& covariance) {
   return rows;
 }
 
-Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth) {
-  Json json = hypothesis_to_json(result, scene);
+Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& result,
+                  const std::optional<glm::dmat3>& truth) {
+  Json json = hypothesis_to_json(result, scene, body);
   json["width"] = scene.width;
   json["height"] = scene.height;
   json["camera"] = camera_with_view(calibrated(scene.camera, result.focal_scale, result.radial));
@@ -194,19 +195,20 @@ Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optio
   json["covariance"] = covariance_to_json(result.covariance);
   Json& equals = json["hypotheses"] = Json::array();
   for (const PoseHypothesis& hypothesis : result.equals)
-    equals.push_back(hypothesis_to_json(hypothesis, scene));
+    equals.push_back(hypothesis_to_json(hypothesis, scene, body));
   Json& history = json["history"] = Json::array();
   for (const PoseIteration& step : result.history) history.push_back(iteration_to_json(step, truth));
   return json;
 }
 
-void add_light(Json& json, const Device& device, const Scene& of, const Image& target,
+void add_light(Json& json, const Device& device, const Scene& of, const PoseBody& body, const Image& target,
                const PoseResult& result, const LeastSquares& method) {
   if (result.light == PoseLight::fixed) return;
   constexpr float k_blur_pixels = 0.25F, k_robust_scale = 0.1F;  // of a robust fit that leaves it open
   Scene scene = of;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(scene.width, scene.height));  // NDC
-  scene.meshes.front().transform = affine(result.pose.rotation * stretch_of(scene), result.pose.translation);
+  const std::vector<glm::mat4> transforms = body.transforms(result.pose);
+  for (std::size_t i = 0; i < transforms.size(); ++i) scene.meshes[i].transform = transforms[i];
   scene.smoothing = Smoothing();
   scene.smoothing.sigma = blur * blur;
   scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
@@ -224,10 +226,10 @@ void add_light(Json& json, const Device& device, const Scene& of, const Image& t
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, const Image& target, const PoseResult& result, bool quiet,
-                       const std::optional<glm::dmat3>& truth) {
+                       const Scene& scene, const PoseBody& body, const Image& target,
+                       const PoseResult& result, bool quiet, const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
-  PoseCamera camera(device, scene);
+  PoseCamera camera(device, scene, body);
   const Image start = camera.render_start(result);
   const Image end = camera.render(result, rigid_smoothing());
   const Differences difference = differences({end}, {target});

@@ -12,6 +12,7 @@
 #include "cli/page.hpp"
 #include "dpr/light.hpp"
 #include "dpr/pose.hpp"
+#include "solve/pose_body.hpp"
 
 namespace dpr::cli {
 
@@ -23,22 +24,23 @@ std::string name_of(PoseLight light);
 /// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 
-/// A pose with its parts, as pose.json has it, of the scene's only mesh.
-Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene);
+/// A pose with its parts, as pose.json has it, of a body of the scene.
+Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene, const PoseBody& body);
 /// A list of rows.
 Json covariance_to_json(const std::vector<double>& covariance);
-/// pose.json, of a fit to the scene's only mesh. With the true rotation, the angle errors too.
-Json pose_to_json(const Scene& scene, const PoseResult& result, const std::optional<glm::dmat3>& truth = {});
+/// pose.json, of a fit to a body of the scene. With the true rotation, the angle errors too.
+Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& result,
+                  const std::optional<glm::dmat3>& truth = {});
 
 /// Adds the light that was found along with the pose to pose.json, as find_light() and find_gain() have it.
-void add_light(Json& json, const Device& device, const Scene& scene, const Image& target,
-               const PoseResult& result, const LeastSquares& method);
+void add_light(Json& json, const Device& device, const Scene& scene, const PoseBody& body,
+               const Image& target, const PoseResult& result, const LeastSquares& method);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
 /// them. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, const Image& target, const PoseResult& result, bool quiet,
-                       const std::optional<glm::dmat3>& truth = {});
+                       const Scene& scene, const PoseBody& body, const Image& target,
+                       const PoseResult& result, bool quiet, const std::optional<glm::dmat3>& truth = {});
 
 }  // namespace dpr::cli

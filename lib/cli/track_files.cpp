@@ -23,7 +23,8 @@ std::string csv_vector(const glm::dvec3& v) { return format("%.9g,%.9g,%.9g", v.
 Json row_to_json(const TrackRow& row, const Scene& scene) {
   Json json{{"frame", row.frame}, {"file", row.file}, {"status", std::string(name_of(row.found.status))}};
   if (row.found.status != TrackStatus::lost) {
-    json.update(hypothesis_to_json({.pose = row.found.pose, .loss = row.found.loss}, scene));
+    json.update(
+        hypothesis_to_json({.pose = row.found.pose, .loss = row.found.loss}, scene, PoseBody(scene, {})));
     json.erase("focal_scale");
     if (!row.found.covariance.empty()) json["covariance"] = covariance_to_json(row.found.covariance);
   }

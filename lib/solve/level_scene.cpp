@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "mesh/cluster_vertices.hpp"
 #include "scene/gradient_table.hpp"
@@ -14,13 +16,6 @@ int scaled(int size, int short_side, int shorter) {
   return std::max(1, static_cast<int>(std::lround(static_cast<double>(size) * shorter / short_side)));
 }
 
-/// World lengths over those of the object.
-double object_scale(const Mesh& mesh, const PoseSpace& space) {
-  double squared_radius = 0;
-  for (const glm::vec3& p : mesh.positions) squared_radius = std::max(squared_radius, double{glm::dot(p, p)});
-  return squared_radius > 0 ? space.radius() / std::sqrt(squared_radius) : 1;
-}
-
 /// The side of a triangle of mean area, object space.
 double mean_side(const Mesh& mesh) {
   double area = 0;
@@ -31,32 +26,83 @@ double mean_side(const Mesh& mesh) {
   return std::sqrt(2 * area / static_cast<double>(mesh.faces.size()));
 }
 
-/// The side of a pixel at the object, object space.
-double pixel_at_object(const Scene& scene, const PoseSpace& space) {
-  const double world_per_ndc = space.radius() / space.radius_ndc();
-  return world_per_ndc * 2.0 / std::min(scene.width, scene.height) /
-         object_scale(scene.meshes.front().mesh, space);
+/// How large a mesh is seen.
+struct Seen {
+  double radius = 0;         ///< about its origin, world
+  double world_per_ndc = 0;  ///< where it is nearest
+};
+
+/// [mesh]. The body may be at its place alone, the others are where they stand.
+std::vector<Seen> seen_meshes(const Scene& scene, const PoseSpace& space) {
+  const double at_object = space.radius() / space.radius_ndc();
+  std::vector<Seen> seen(scene.meshes.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const glm::dmat4 view(scene.camera.view), transform(scene.meshes[i].transform);
+    double squared_radius = 0, nearest = static_cast<double>(scene.camera.zfar);
+    for (const glm::vec3& p : mesh_of(scene, i).positions) {
+      const glm::dvec3 arm = glm::dmat3(transform) * glm::dvec3(p);
+      squared_radius = std::max(squared_radius, glm::dot(arm, arm));
+      nearest = std::min(nearest, -(view * (transform[3] + glm::dvec4(arm, 0))).z);
+    }
+    nearest = std::max(nearest, static_cast<double>(scene.camera.znear));
+    seen[i] = {std::sqrt(squared_radius), at_object * space.relative_distance(nearest)};
+  }
+  for (const BodyPart& part : space.body().parts()) seen[part.mesh].world_per_ndc = at_object;
+  if (seen.size() == 1) seen.front().radius = space.radius();
+  return seen;
+}
+
+/// World lengths over those of the mesh.
+double object_scale(const Mesh& mesh, const Seen& seen) {
+  double squared_radius = 0;
+  for (const glm::vec3& p : mesh.positions) squared_radius = std::max(squared_radius, double{glm::dot(p, p)});
+  return squared_radius > 0 ? seen.radius / std::sqrt(squared_radius) : 1;
+}
+
+/// The least side of a pixel at the mesh, wherever it stands, object space.
+double pixel_at(const Scene& scene, std::size_t mesh, const std::vector<Seen>& seen) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (scene.meshes[i].instance_of.value_or(i) != mesh) continue;
+    const double world = seen[i].world_per_ndc * 2.0 / std::min(scene.width, scene.height);
+    least = std::min(least, world / object_scale(mesh_of(scene, mesh), seen[i]));
+  }
+  return least;
 }
 
 /// Triangles smaller than the pixels cost time and show little.
-void simplify(Scene& scene, const PoseSpace& space) {
+void simplify(Scene& scene, const std::vector<Seen>& seen) {
   constexpr double k_fine = 0.8, k_cell = 1;  // of a pixel
-  Mesh& mesh = scene.meshes.front().mesh;
-  const double pixel = pixel_at_object(scene, space);
-  if (mean_side(mesh) < k_fine * pixel) mesh = cluster_vertices(mesh, static_cast<float>(k_cell * pixel));
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (scene.meshes[i].instance_of) continue;
+    Mesh& mesh = scene.meshes[i].mesh;
+    const double pixel = pixel_at(scene, i, seen);
+    if (mean_side(mesh) < k_fine * pixel) mesh = cluster_vertices(mesh, static_cast<float>(k_cell * pixel));
+    for (Texture& texture : mesh.textures) texture.filter = Filter::trilinear;
+  }
+}
+
+/// Least side of a mesh's triangle of mean area, in pixels.
+double side_in_pixels(const Scene& scene, const std::vector<Seen>& seen) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!scene.meshes[i].instance_of)
+      least = std::min(least, mean_side(scene.meshes[i].mesh) / pixel_at(scene, i, seen));
+  }
+  return least;
 }
 
 /// The solver's own member of the family: the expected rigid image, edges blurred by a part of a pixel,
 /// depths by the same length in the world. Where triangles have noise of their own, those smaller than the
 /// blur would fade: it is no more than a part of their side.
-Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const LeastSquares& options,
-                          float blur) {
+Smoothing level_smoothing(const Scene& scene, const PoseSpace& space, const std::vector<Seen>& seen,
+                          const LeastSquares& options, float blur) {
   constexpr double k_of_side = 0.25;
   // Fainter fragments cost as much and say little. With a robust loss a few degrees depend on them.
   constexpr float k_least_occupancy = 1e-2F;
   const double pixel_ndc = 2.0 / std::min(scene.width, scene.height);
   const double world_per_ndc = space.radius() / space.radius_ndc();
-  const double side_pixels = mean_side(scene.meshes.front().mesh) / pixel_at_object(scene, space);
+  const double side_pixels = side_in_pixels(scene, seen);
   const double least = static_cast<double>(std::min(blur, options.blur_end));
   const bool of_pixel = options.noise == Noise::pixel;
   const double most = of_pixel ? static_cast<double>(blur) : k_of_side * side_pixels;
@@ -78,11 +124,10 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.width = shape.samples * scaled(scene.width, full, shape.short_side);
   result.height = shape.samples * scaled(scene.height, full, shape.short_side);
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
-  if (shape.short_side < full) {  // the answer comes from the mesh and the textures themselves
-    simplify(result, space);
-    for (Texture& texture : result.meshes.front().mesh.textures) texture.filter = Filter::trilinear;
-  }
-  result.smoothing = level_smoothing(result, space, options, shape.blur);
+  const std::vector<Seen> seen = seen_meshes(scene, space);
+  // The answer comes from the meshes and the textures themselves.
+  if (shape.short_side < full) simplify(result, seen);
+  result.smoothing = level_smoothing(result, space, seen, options, shape.blur);
   result.gradients = no_gradients();
   if (light != PoseLight::fixed) {  // unlit over black: NormalSums adds both
     result.lights.reset();

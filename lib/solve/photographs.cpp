@@ -75,7 +75,7 @@ struct LitPixel {
   double weight;
 };
 
-/// The pixels that show the scene's only mesh.
+/// The pixels that show the scene's meshes.
 std::vector<LitPixel> lit_pixels(const Device& device, Scene scene, std::span<const ShapeView> views) {
   constexpr float k_shown = 0.99F;  // coverage: others show the background too
   const glm::vec3 background = std::exchange(scene.background, glm::vec3(0));
@@ -84,7 +84,8 @@ std::vector<LitPixel> lit_pixels(const Device& device, Scene scene, std::span<co
   renderer.set_scene(scene);
   std::vector<LitPixel> pixels;
   for (const ShapeView& view : views) {
-    const View one{view.camera, {scene.meshes.front().transform}};
+    View one{view.camera, {}};
+    for (const Instance& instance : scene.meshes) one.transforms.push_back(instance.transform);
     renderer.set_views({&one, 1});
     std::vector<Image> images;
     for (std::size_t k = 0; k < k_harmonics; ++k) {

@@ -1,6 +1,7 @@
 // The pose solver's public face: checks what it is given and hands it to a method.
 #include "dpr/pose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -10,8 +11,8 @@
 #include "base/clock.hpp"
 #include "dpr/error.hpp"
 #include "solve/polar.hpp"
+#include "solve/pose_body.hpp"
 #include "solve/pose_descent.hpp"
-#include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/pose_search.hpp"
 
@@ -25,6 +26,20 @@ void require_rotation(const glm::dmat3& rotation) {
   for (int c = 0; c < 3; ++c) error += glm::dot(excess[c], excess[c]);
   require(std::sqrt(error) < k_tolerance && glm::determinant(rotation) > 0, "initial rotation (pose)",
           std::sqrt(error), "an orthonormal matrix with determinant 1 (shown: |R^T R - 1|)");
+}
+
+void validate_meshes(const Scene& scene, const std::vector<std::size_t>& meshes) {
+  const std::size_t count = scene.meshes.size();
+  if (meshes.empty())
+    require(count == 1, "number of meshes (pose)", count, "1, or a list of those that move");
+  for (const std::size_t mesh : meshes) {
+    if (mesh >= count) {
+      throw InvalidArgument("meshes (pose)", std::to_string(mesh),
+                            "numbers of the scene's meshes, below " + std::to_string(count));
+    }
+    if (std::ranges::count(meshes, mesh) > 1)
+      throw InvalidArgument("meshes (pose)", std::to_string(mesh) + " twice", "each once");
+  }
 }
 
 const LeastSquares& require_least_squares(const PoseOptions& options, const char* wanted) {
@@ -46,7 +61,7 @@ PoseResult timed(const Work& work) {
 
 PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options)
     : device_(std::move(device)), scene_(std::move(scene)), target_(target), options_(std::move(options)) {
-  require(scene_.meshes.size() == 1, "number of meshes (pose)", scene_.meshes.size(), "1");
+  validate_meshes(scene_, options_.meshes);
   validate(scene_);
   const auto* least_squares = std::get_if<LeastSquares>(&options_.method);
   if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares)) {
@@ -66,12 +81,18 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
                           "a perspective one, or a rotation to look for alone");
   }
   std::visit([&](const auto& method) { validate(method, scene_); }, options_.method);
-  const double determinant = glm::determinant(glm::dmat3(scene_.meshes.front().transform));
+  const bool stands = scene_.meshes.size() > std::max<std::size_t>(1, options_.meshes.size());
+  if (stands && least_squares != nullptr && !least_squares->silhouette.image.pixels.empty()) {
+    throw InvalidArgument("silhouette (pose)", "one in a scene where meshes stand still",
+                          "colours or depths, which show these too");
+  }
+  const std::size_t first = options_.meshes.empty() ? 0 : options_.meshes.front();
+  const double determinant = glm::determinant(glm::dmat3(scene_.meshes[first].transform));
   require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,
           "a value other than 0");
 }
 
-Pose PoseSolver::scene_pose() const { return pose_of(scene_); }
+Pose PoseSolver::scene_pose() const { return PoseBody(scene_, options_.meshes).pose(); }
 
 unsigned PoseSolver::most_iterations() const {
   if (const auto* descent = std::get_if<Descent>(&options_.method)) return descent->iterations;

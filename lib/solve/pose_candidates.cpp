@@ -4,8 +4,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
-#include "solve/polar.hpp"
-
 namespace dpr {
 
 bool by_loss(const Candidate& a, const Candidate& b) { return a.equations.loss < b.equations.loss; }
@@ -53,11 +51,9 @@ bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, 
   });
 }
 
-std::array<glm::dmat3, 3> half_turns(const Instance& object) {
-  const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
+std::array<glm::dmat3, 3> half_turns(std::span<const glm::dvec3> points) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const glm::vec3& position : object.mesh.positions) {
-    const glm::dvec3 p = stretch * glm::dvec3(position);
+  for (const glm::dvec3& p : points) {
     const Eigen::Vector3d v(p.x, p.y, p.z);
     spread += v * v.transpose();
   }

@@ -36,8 +36,8 @@ void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const 
 /// be right.
 bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal);
 
-/// Rotations by half a turn about each of the object's axes of inertia, through its origin: what many an
-/// object looks much the same after.
-std::array<glm::dmat3, 3> half_turns(const Instance& object);
+/// Rotations by half a turn about each of the axes of inertia of an object with these points, through its origin: what
+/// many an object looks much the same after.
+std::array<glm::dmat3, 3> half_turns(std::span<const glm::dvec3> points);
 
 }  // namespace dpr

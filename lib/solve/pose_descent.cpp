@@ -25,17 +25,18 @@ namespace {
 /// The loss and its gradient as functions of the pose.
 class Objective {
  public:
-  Objective(const Device& device, const Scene& scene, const Image& target, LossWeights weights)
+  Objective(const Device& device, const Scene& scene, const Image& target, const PoseBody& body,
+            LossWeights weights)
       : renderer_(device),
         loss_(device, weights, {&target, 1}),
-        stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+        body_(body),
         smoothing_(scene.smoothing),
-        view_{scene.camera, {scene.meshes.front().transform}} {
+        view_{scene.camera, body.transforms(body.pose())} {
     renderer_.set_scene(scene);
   }
 
   double evaluate(const Pose& pose, unsigned iteration) {
-    view_.transforms.front() = affine(pose.rotation * stretch_, pose.translation);
+    view_.transforms = body_.transforms(pose);
     renderer_.set_views({&view_, 1});
 
     // Fresh noise in every iteration: its errors average out along the descent instead of adding up to a
@@ -53,6 +54,9 @@ class Objective {
   }
 
   SceneGradient gradient() { return renderer_.backward(loss_); }
+  PoseGradient by_pose(const SceneGradient& gradient, const Pose& pose) const {
+    return body_.gradient(pose, gradient.views.front().transforms);
+  }
 
   int width() const { return renderer_.scene().width; }
   int height() const { return renderer_.scene().height; }
@@ -65,7 +69,7 @@ class Objective {
  private:
   Renderer renderer_;
   ImageLoss loss_;
-  glm::dmat3 stretch_;
+  PoseBody body_;
   Smoothing smoothing_;
   View view_;
 };
@@ -147,7 +151,7 @@ Found descend_from(Objective& objective, const Descent& options, bool with_trans
       break;
     }
     const SceneGradient gradient = objective.gradient();
-    descend(pose, optimizer, gradient.views.front().transforms.front(), with_translation);
+    descend(pose, optimizer, objective.by_pose(gradient, pose), with_translation);
     const bool is_last = i + 1 == options.iterations;  // no level without an iteration
     if (!is_last && schedule.update(i, by_smoothing(best.smoothing, gradient), best.smoothing, optimizer)) {
       objective.set_smoothing(best.smoothing);
@@ -173,8 +177,10 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
   scene.gradients = no_gradients();
   scene.gradients.transform = true;
   scene.gradients.smoothing = std::holds_alternative<AdaptiveSchedule>(descent.schedule);
-  const std::vector<View> lenses = PoseSpace(scene, initial, options).seen_through_lenses(scene.camera);
-  Objective objective(device, subdivide_for_lens(scene, {}, lenses).scene, target, descent.loss);
+  const PoseSpace space(scene, initial, options);
+  const std::vector<View> lenses = space.seen_through_lenses(scene.camera);
+  Objective objective(device, subdivide_for_lens(scene, {}, lenses).scene, target, space.body(),
+                      descent.loss);
 
   PoseResult result;
   result.start = initial;

@@ -8,7 +8,6 @@
 #include "dpr/subdivision.hpp"
 #include "renderer/frame.hpp"
 #include "solve/level_scene.hpp"
-#include "solve/polar.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/resample.hpp"
 
@@ -22,17 +21,32 @@ constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 constexpr double k_color_channels = 3;
 constexpr std::size_t k_coverage = 0, k_depth = 1;  // kinds of MeasuredWeights
 
-/// The object without colours and light, its vertices with room for depths in place of colours.
-Scene shape_alone(Scene scene) {
-  Mesh& mesh = scene.meshes.front().mesh;
+/// Positions and faces alone, black.
+Mesh shape_of(const Mesh& mesh) {
   Mesh shape;
-  shape.positions = std::move(mesh.positions);
-  shape.faces = std::move(mesh.faces);
+  shape.positions = mesh.positions;
+  shape.faces = mesh.faces;
   shape.vertex_colors.resize(shape.positions.size());
-  mesh = std::move(shape);
+  return shape;
+}
+
+/// The meshes without colours and light, their vertices with room for depths in place of colours.
+Scene shapes_alone(Scene scene) {
+  for (Instance& instance : scene.meshes) instance.mesh = shape_of(instance.mesh);
   scene.lights.reset();
   scene.background = glm::vec3(0);
   return scene;
+}
+
+/// Each mesh coloured by its normals in the body's axes. Those that stand still have none, as directions of light turn
+/// with the body: they are seen in the mean light.
+Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals normals) {
+  Scene result = scene;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i)
+    result.meshes[i] = {shape_of(mesh_of(scene, i)), scene.meshes[i].transform};
+  for (const BodyPart& part : body.parts())
+    result.meshes[part.mesh].mesh = colored_by_normals(mesh_of(scene, part.mesh), part.linear, normals);
+  return result;
 }
 
 /// That of one of sixteen is less: the very best may fit by luck. Empty: 0.
@@ -70,14 +84,10 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
   scene_ = subdivide_for_lens(whole, {}, lenses).scene;
   colors_.renderer.set_scene(scene_);
   if (light == PoseLight::harmonics) {
-    Scene colored = whole;
-    Instance& object = colored.meshes.front();
-    const glm::dmat3 stretch = polar_decomposition(glm::dmat3(object.transform)).stretch;
-    object.mesh = colored_by_normals(object.mesh, stretch, normals);
-    show(normals_.emplace(Images{Renderer(device)}), colored);
+    show(normals_.emplace(Images{Renderer(device)}), with_normals(whole, space.body(), normals));
   }
   if (!options.depth.image.pixels.empty())
-    show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shape_alone(whole));
+    show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));
   target_.background = scene.background;
   const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
                                                  : resample(options.mask, width(), height());
@@ -113,7 +123,7 @@ std::vector<cl_float4> PoseLevel::measured(const LeastSquares& options, const Im
   };
   Image silhouette = options.silhouette.image, depth = options.depth.image;
   for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
-  if (silhouette.pixels.empty() && !counts_colors_ && space_.may_cover(depth)) {
+  if (silhouette.pixels.empty() && !counts_colors_ && space_.body().is_alone() && space_.may_cover(depth)) {
     silhouette = depth;
     for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
@@ -128,7 +138,8 @@ double PoseLevel::pixel_ndc() const { return 2.0 / std::min(width(), height()); 
 template <typename Visitor>
 void PoseLevel::in_batches(std::span<const Hypothesis> hypotheses, std::size_t images_each,
                            const Visitor& visit) const {
-  const std::size_t faces = scene_.meshes.front().mesh.faces.size();
+  std::size_t faces = 0;
+  for (std::size_t i = 0; i < scene_.meshes.size(); ++i) faces += mesh_of(scene_, i).faces.size();
   const std::size_t fitting = std::min(k_most_pixels / pixels_of(scene_), k_most_faces / faces);
   const std::size_t batch = std::max(fitting / images_each, std::size_t{1});
   for (std::size_t first = 0; first < hypotheses.size(); first += batch)
@@ -243,7 +254,7 @@ ScoreCells PoseLevel::score_cells(const Hypothesis& hypothesis) {
   return sums_->score_cells(images, tangents, scales_, static_cast<std::size_t>(width()));
 }
 
-double PoseLevel::blank_loss() const {
+double PoseLevel::blank_loss() {
   const std::size_t pixels = target_.colors.size();
   const auto robust = [](double squared, float scale) {
     return squared / (1 + (scale > 0 ? squared / std::pow(static_cast<double>(scale), 2) : 0));
@@ -266,7 +277,10 @@ double PoseLevel::blank_loss() const {
     }
     return sum;
   };
-  return (std::min(loss_of(target_.background), loss_of(mean)) + observed) / sums_->total();
+  const double blank = (std::min(loss_of(target_.background), loss_of(mean)) + observed) / sums_->total();
+  if (space_.body().is_alone()) return blank;
+  const Hypothesis absent = space_.absent(scene_.camera);
+  return std::min(blank, losses({&absent, 1}).front());
 }
 
 }  // namespace dpr

@@ -47,9 +47,9 @@ class PoseLevel {
   void set_scales(const LossScales& scales) { scales_ = scales; }
   void set_color_scale(float scale) { scales_.color = scale; }
   const LossScales& scales() const { return scales_; }
-  /// The loss of the better of two pictures without an object: the scene's background, and the target's mean
-  /// colour.
-  double blank_loss() const;
+  /// The least loss of pictures without the object: the scene's background, the target's mean colour, and the meshes
+  /// that stand still.
+  double blank_loss();
 
   int width() const { return scene_.width / samples_; }
   int height() const { return scene_.height / samples_; }

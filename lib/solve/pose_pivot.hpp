@@ -9,15 +9,12 @@
 
 namespace dpr {
 
-/// The pose of the transform of a scene's first mesh, its scale taken apart.
-Pose pose_of(const Scene& scene);
-
 /// A scene whose object turns about the middle of its bounding box: a mesh may lie far from its origin, about which a
 /// rotation would throw it out of the picture. Poses are translated between the two.
 class PosePivot {
  public:
   /// Without a translation to look for the object turns about its origin: poses stay as they are.
-  PosePivot(const Scene& scene, bool solves_translation);
+  PosePivot(const Scene& scene, const PoseOptions& options);
 
   const Scene& scene() const { return scene_; }
   Pose to_middle(const Pose& pose) const { return {pose.rotation, pose.translation + pose.rotation * arm_}; }

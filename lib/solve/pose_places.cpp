@@ -6,7 +6,6 @@
 #include <numbers>
 #include <variant>
 
-#include "solve/polar.hpp"
 #include "solve/pose_window.hpp"
 #include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
@@ -20,19 +19,24 @@ constexpr std::size_t k_best_places = 8, k_of_place = 12, k_of_start = 48;
 
 const LeastSquares& method_of(const PoseOptions& options) { return std::get<LeastSquares>(options.method); }
 
-/// The points that are furthest in directions all around.
-std::vector<glm::dvec3> outermost(const Mesh& mesh, const glm::dmat3& stretch) {
+/// The body's points that are furthest in directions all around.
+std::vector<glm::dvec3> outermost(const Scene& scene, const PoseBody& body) {
   constexpr std::size_t k_directions = 200;
   std::vector<glm::dvec3> points;
   for (std::size_t i = 0; i < k_directions; ++i) {  // on a Fibonacci spiral
     const double z = 1 - (2 * static_cast<double>(i) + 1) / static_cast<double>(k_directions);
     const double angle = 2 * std::numbers::pi / std::numbers::phi * static_cast<double>(i),
                  r = std::sqrt(1 - z * z);
-    const glm::vec3 direction(glm::transpose(stretch) *
-                              glm::dvec3(r * std::cos(angle), r * std::sin(angle), z));
-    const glm::vec3 furthest = *std::ranges::max_element(
-        mesh.positions, {}, [&](const glm::vec3& p) { return glm::dot(p, direction); });
-    points.push_back(stretch * glm::dvec3(furthest));
+    const glm::dvec3 direction(r * std::cos(angle), r * std::sin(angle), z);
+    std::vector<glm::dvec3> of_parts;
+    for (const BodyPart& part : body.parts()) {
+      const glm::vec3 in_part(glm::transpose(part.linear) * direction);
+      const glm::vec3 furthest = *std::ranges::max_element(
+          mesh_of(scene, part.mesh).positions, {}, [&](const glm::vec3& p) { return glm::dot(p, in_part); });
+      of_parts.push_back(part.linear * glm::dvec3(furthest) + part.offset);
+    }
+    points.push_back(
+        *std::ranges::max_element(of_parts, {}, [&](const glm::dvec3& p) { return glm::dot(p, direction); }));
   }
   return points;
 }
@@ -77,9 +81,8 @@ void add_places(const Scene& scene, double distance, double radius, std::vector<
 
 }  // namespace
 
-BoxPlaces::BoxPlaces(const Scene& scene, const PoseBox& box)
-    : points_(outermost(scene.meshes.front().mesh,
-                        polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch)),
+BoxPlaces::BoxPlaces(const Scene& scene, const PoseBody& body, const PoseBox& box)
+    : points_(outermost(scene, body)),
       axes_(scene.camera.view),
       from_camera_(glm::inverse(axes_)),
       eye_(scene.camera.view[3]),
@@ -134,9 +137,8 @@ PosePlaces::PosePlaces(const Scene& scene, const PoseOptions& options, const Pos
     : scene_(scene), start_(initial), about_(initial) {
   constexpr std::size_t k_enough = 15;  // rotations that tell the distance
   const LeastSquares& method = method_of(options);
-  const glm::dmat3 stretch = polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch;
-  for (const glm::vec3& p : scene.meshes.front().mesh.positions)
-    radius_ = std::max(radius_, glm::length(stretch * glm::dvec3(p)));
+  const PoseBody body(scene, options.meshes);
+  for (const glm::dvec3& p : body.points(scene)) radius_ = std::max(radius_, glm::length(p));
   if (!options.solve_translation) return;
   const std::optional<PoseBox> box = box_of_search(options, anywhere);
   const bool is_silhouette = !method.silhouette.image.pixels.empty();
@@ -144,7 +146,7 @@ PosePlaces::PosePlaces(const Scene& scene, const PoseOptions& options, const Pos
   tries_start_ = anywhere && !method.box && box;
   if (!box) return;
   is_mask_ = !method.box && !is_silhouette;
-  box_.emplace(scene, *box);
+  box_.emplace(scene, body, *box);
   std::vector<Hypothesis> guesses = grid(k_enough);
   const auto middle = guesses.begin() + std::ssize(guesses) / 2;
   std::ranges::nth_element(guesses, middle, {},

@@ -17,8 +17,8 @@ namespace dpr {
 /// the centre and the diagonal of the box.
 class BoxPlaces {
  public:
-  /// The object of the scene's only mesh. The camera must be a perspective one.
-  BoxPlaces(const Scene& scene, const PoseBox& box);
+  /// The camera must be a perspective one.
+  BoxPlaces(const Scene& scene, const PoseBody& body, const PoseBox& box);
 
   /// Object-to-world translation. `distance`: factor on the distance from the camera.
   glm::dvec3 translation(const glm::dmat3& rotation, double distance = 1) const;
@@ -40,7 +40,7 @@ struct PlaceGroup {
 /// Where the hypotheses of a fit begin.
 class PosePlaces {
  public:
-  /// For the object of the scene's only mesh, which turns about its origin. `anywhere`: of a search, for which the
+  /// For the scene's body, which turns about its origin. `anywhere`: of a search, for which the
   /// initial pose is a guess. Only with a translation to look for places differ from the initial one.
   PosePlaces(const Scene& scene, const PoseOptions& options, const Pose& initial, bool anywhere);
 

@@ -37,7 +37,7 @@ class Fit {
         initial_(initial.begin(), initial.end()),
         places_(places),
         space_(scene, places.about(), options),
-        half_turns_(half_turns(scene.meshes.front())) {}
+        half_turns_(half_turns(space_.body().points(scene))) {}
 
   FittedPose run(bool anywhere);
 
@@ -179,7 +179,9 @@ float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
 /// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
 /// better. A mesh's own normals leave nothing to choose.
 void Fit::choose_normals(const LevelShape& shape) {
-  const bool are_given = !scene_.meshes.front().mesh.face_normals.empty();
+  const bool are_given = std::ranges::all_of(space_.body().parts(), [&](const BodyPart& part) {
+    return !mesh_of(scene_, part.mesh).face_normals.empty();
+  });
   if (light_ != PoseLight::harmonics || are_given) return;
   PoseLevel parted = make_level(shape, light_);
   set_scales(parted, hypotheses());
@@ -278,7 +280,7 @@ void Fit::choose_equals(bool anywhere) {
 FittedPose fit_about_middle(const Device& device, const Scene& scene, const Image& target,
                             const PoseOptions& options, std::span<const Pose> initial, bool anywhere,
                             const PoseSolver::Callback& callback) {
-  const PosePivot pivot(scene, options.solve_translation);
+  const PosePivot pivot(scene, options);
   std::vector<Pose> starts;
   for (const Pose& pose : initial) starts.push_back(pivot.to_middle(pose));
   PoseSolver::Callback report;

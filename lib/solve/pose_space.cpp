@@ -38,11 +38,12 @@ Camera calibrated(const Camera& camera, double focal_scale, const glm::dvec2& ra
 }
 
 PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions& options)
-    : stretch_(polar_decomposition(glm::dmat3(scene.meshes.front().transform)).stretch),
+    : body_(scene, options.meshes),
       initial_translation_(initial.translation),
       translation_(options.solve_translation),
       focal_(options.solve_focal),
       distortion_(options.solve_distortion),
+      is_perspective_(!scene.camera.orthographic_height),
       focal_index_(k_translation + (translation_ ? 3 : 0)),
       radial_index_(focal_index_ + (focal_ ? 1 : 0)),
       size_(radial_index_ + (distortion_ ? 2 : 0)) {
@@ -50,17 +51,14 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions&
   camera_axes_ =
       glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
   double squared_radius = 0;
-  for (const glm::vec3& p : scene.meshes.front().mesh.positions) {
-    const glm::dvec3 q = stretch_ * glm::dvec3(p);
-    squared_radius = std::max(squared_radius, glm::dot(q, q));
-  }
+  for (const glm::dvec3& p : body_.points(scene)) squared_radius = std::max(squared_radius, glm::dot(p, p));
   radius_ = std::sqrt(std::max(squared_radius, 1e-30));
   // An object about or behind the camera still needs units to move in.
   const glm::dvec3 centre(view * glm::dvec4(initial.translation, 1.0));
   distance_ = std::max(-centre.z, static_cast<double>(scene.camera.znear));
   rim_ = (glm::length(glm::dvec2(centre)) + radius_) / distance_;
   const glm::vec2 scale = projection(scene.camera, scene.width, scene.height).scale;
-  const double divisor = scene.camera.orthographic_height ? 1.0 : distance_;
+  const double divisor = is_perspective_ ? distance_ : 1.0;
   ndc_per_tangent_ = static_cast<double>(std::max(scale.x, scale.y));
   radius_ndc_ = radius_ / divisor * ndc_per_tangent_;
 }
@@ -115,22 +113,27 @@ View PoseSpace::view(const Hypothesis& hypothesis, const Camera& camera) const {
   Camera seen = calibrated(camera, hypothesis.focal_scale, hypothesis.radial);
   if (distortion_ && !seen.distortion)
     seen.distortion.emplace();  // a perfect lens, whose tangents are asked for
-  return {seen, {affine(hypothesis.pose.rotation * stretch_, hypothesis.pose.translation)}};
+  return {seen, body_.transforms(hypothesis.pose)};
 }
 
 ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera& camera,
                                      std::size_t parameter) const {
-  ViewGradient tangent{.camera = {}, .transforms = {{}}};
+  ViewGradient tangent{.camera = {}, .transforms = body_.shifting(glm::dvec3(0))};
   if (parameter < k_translation) {
-    tangent.transforms[0].rotation[static_cast<int>(parameter)] = 1;
+    tangent.transforms = body_.turning(hypothesis.pose, glm::dmat3(1.0)[static_cast<int>(parameter)]);
   } else if (parameter < focal_index_) {
-    tangent.transforms[0].translation = camera_axes_[static_cast<int>(parameter - k_translation)];
+    tangent.transforms = body_.shifting(camera_axes_[static_cast<int>(parameter - k_translation)]);
   } else if (parameter < radial_index_) {
     tangent.camera = zoom_tangent(calibrated(camera, hypothesis.focal_scale, hypothesis.radial));
   } else {
     tangent.camera.distortion[parameter - radial_index_] = 1;
   }
   return tangent;
+}
+
+Hypothesis PoseSpace::absent(const Camera& camera) const {
+  const glm::dvec3 eye(glm::inverse(glm::dmat4(camera.view))[3]);
+  return {{glm::dmat3(1.0), eye + 2 * radius_ * camera_axes_[2]}};
 }
 
 bool PoseSpace::may_cover(const Image& depths) const {

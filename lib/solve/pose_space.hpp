@@ -8,6 +8,7 @@
 
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
+#include "solve/pose_body.hpp"
 
 namespace dpr {
 
@@ -40,23 +41,29 @@ class PoseSpace {
   View view(const Hypothesis& hypothesis, const Camera& camera) const;
   /// How that view changes with a parameter.
   ViewGradient view_tangent(const Hypothesis& hypothesis, const Camera& camera, std::size_t parameter) const;
+  /// The body behind the camera: the other meshes alone are seen.
+  Hypothesis absent(const Camera& camera) const;
   /// Poses all around at the initial place, before the camera's lens, and such as may be found where one is
   /// looked for: what faces are cut for. None without a lens.
   std::vector<View> seen_through_lenses(const Camera& camera) const;
   /// World axes instead of the camera's: row-major [size][size] of a covariance of steps.
   std::vector<double> to_world(std::span<const double> covariance) const;
 
+  const PoseBody& body() const { return body_; }
   double radius() const { return radius_; }  ///< of the object about its origin, world
   /// True if the pixels that have a depth, in the first channel where alpha is not 0, may be those of the object alone:
   /// they are no more than its sphere could cover about where it begins, and none is further from there along the axis
   /// than its radius, or where a translation is looked for its diameter.
   bool may_cover(const Image& depths) const;
   double radius_ndc() const { return radius_ndc_; }
+  /// World lengths of 1 NDC at a distance along the camera's axis, in relation to those at the object.
+  double relative_distance(double distance) const { return is_perspective_ ? distance / distance_ : 1; }
 
  private:
-  glm::dmat3 stretch_, camera_axes_;
+  PoseBody body_;
+  glm::dmat3 camera_axes_;
   glm::dvec3 initial_translation_;
-  bool translation_, focal_, distortion_;
+  bool translation_, focal_, distortion_, is_perspective_;
   std::size_t focal_index_, radial_index_, size_;  // where their parameters begin, and how many there are
   double radius_, distance_, radius_ndc_;
   double rim_;  // the largest tangent at which the object is seen, about

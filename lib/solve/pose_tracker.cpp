@@ -54,10 +54,11 @@ struct PoseTracker::Impl {
   Impl(Device device_, const Scene& scene, TrackOptions options_)
       : device(std::move(device_)),
         options(std::move(options_)),
-        pivot(checked(scene, options, device), options.solve_translation),
-        start(pose_of(pivot.scene())),
+        pivot(checked(scene, options, device), pose_options(options)),
+        body(pivot.scene(), {}),
+        start(body.pose()),
         motion(start, static_cast<double>(options.damping)),
-        half_turns(dpr::half_turns(pivot.scene().meshes.front())) {}
+        half_turns(dpr::half_turns(body.points(pivot.scene()))) {}
 
   TrackedPose track(const Image& frame);
 
@@ -97,6 +98,7 @@ struct PoseTracker::Impl {
   Device device;
   TrackOptions options;
   PosePivot pivot;
+  PoseBody body;
   Pose start;  // about the pivot, as all poses here
   PoseMotion motion;
   std::array<glm::dmat3, 3> half_turns;

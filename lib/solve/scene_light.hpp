@@ -11,8 +11,8 @@
 
 namespace dpr {
 
-/// find_light() for the only mesh of a scene, where it stands and with the colours and textures that it has,
-/// over the scene's background, in views of which the cameras are known. None where no image shows it.
+/// find_light() for the meshes of a scene, where they stand and with the colours and textures that they have,
+/// over the scene's background, in views of which the cameras are known. None where no image shows them.
 std::optional<Lights> find_light(const Device& device, const Scene& scene, std::span<const ShapeView> views,
                                  float robust_scale);
 
@@ -21,7 +21,7 @@ struct ColorGain {
   dvec3 gain{1.0}, offset{0.0};
 };
 
-/// The gain in which the same mesh explains one image, without the scene's lights. None where it is not seen.
+/// The gain in which the same meshes explain one image, without the scene's lights. None where they are not seen.
 std::optional<ColorGain> find_gain(const Device& device, Scene scene, const ShapeView& view,
                                    float robust_scale);
 

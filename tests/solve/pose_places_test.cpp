@@ -79,7 +79,7 @@ TEST_SUITE("unit") {
   TEST_CASE("from its place in a box an object fills the box, whatever its rotation") {
     const Scene scene = cube_scene();
     const PoseBox box{10, 20, 24, 18};
-    const BoxPlaces places(scene, box);
+    const BoxPlaces places(scene, PoseBody(scene, {}), box);
     for (const glm::dvec3& r : {glm::dvec3(0), glm::dvec3(0.4, 0.9, -0.3), glm::dvec3(2, 0, 1)}) {
       const glm::dmat3 rotation = rotation_from_vector(r);
       const glm::dmat4 place(affine(rotation, places.translation(rotation)));
