@@ -87,7 +87,7 @@ typedef struct dpr_frame_options {
 /* "preset, sigma, ...": the keys of "smoothing" in the scene format; "znear", "zfar" and "cull"; "shading"
  * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp". */
 DPR_API const char* dpr_frame_settings(void);
-/* Refuses size and settings that cannot be rendered with, and settings without a part in the smoothing, such
+/* Refuses size and settings that cannot be rendered with, and settings that the smoothing does not use, such
  * as "sigma" of the preset "rigid". Opens no device. */
 DPR_API dpr_status dpr_frame_check(const dpr_frame_options* options);
 /* Renders, and seldom waits for the device. The frame holds buffers there, which the backward pass reads,

@@ -73,7 +73,7 @@ void validate_clipping(const std::optional<float>& znear, const std::optional<fl
   validate(camera);
 }
 
-/// Fails for an option without a part in the smoothing that the options come to.
+/// Fails for an option that the smoothing, which follows from all options, does not use.
 void require_parts(const SmoothingOptions& given, const Smoothing& smoothing) {
   const auto require = [](bool has_part, const std::string& name, bool is_given, const char* with,
                           const char* because) {

@@ -13,14 +13,16 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
     return command.add_option(name, value, description)->group(group)->type_name(type);
   };
   add("--rotations", method.rotations,
-      "Rotations tried at the coarsest level; 0: only the initial one; 1152 by default", "N");
+      "Rotations all around that are tried at the coarsest level, beside the initial one; 0: none; 1152 by "
+      "default",
+      "N");
   add("--coarsest", method.coarsest, "Pixels on the short side of the coarsest level; 16 by default", "N");
   add("--level-iterations", method.iterations,
       "Steps a level, more while the best pose still improves; 10 by default", "N");
   add("--blur", method.blur, "Blur of the edges, in pixels of the level; 0.25 by default", "FLOAT");
   add("--robust", method.robust_scale,
-      "Weighs pixels of other colours (clutter, occlusion) hardly at all; a number is the colour difference "
-      "from which on, else the residuals tell",
+      "Weighs pixels of other colours (clutter, occlusion) hardly at all: those that differ by more than the "
+      "number; without one it follows from the residuals",
       "[FLOAT]")
       ->expected(0, 1);
   add("--light", options.light,

@@ -38,7 +38,7 @@ class Renderer:
         shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
 
     Settings may be changed later, as attributes: renderer.blur = 0.5. Unknown names are refused, and so is a
-    setting without a part in the smoothing: sigma of the preset "rigid", alpha of the joint composition,
+    setting that the smoothing does not use: sigma of the preset "rigid", alpha of the joint composition,
     samples of an exact estimator. A Renderer is pickled with its settings. Devices are opened, and kernels built, by
     the first call in a process. Several threads may render with it at once. OpenCL does not survive fork(): a process
     forked after that gets an error from a call; start it with "spawn", or render in the parent later. Frames of a graph
@@ -155,10 +155,10 @@ class Renderer:
         barycentrics [N, height, width, 3] and uv [N, height, width, 2] of that face; effective_faces, how many faces
         share a pixel.
 
-        The images have first derivatives with respect to every float array above: those of the views are of any affine
-        matrices, with lights of rigid motions. Depth, position, normal and texcoords have those of vertices, views (of
-        rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, by way of what is shown and of how much
-        of it is seen, and cost about an image each, normals four. The other outputs have none. Errors name the
+        The images have first derivatives with respect to every float array above. Views may be any affine matrices, but
+        with lights their derivatives are those of rigid motions. Depth, position, normal and texcoords have derivatives
+        with respect to vertices, views (rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, of what
+        is shown and of how much of it is seen; each costs about an image, normals four. The other outputs have none. Errors name the
         argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes and of what arrays
         hold, dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as those have them. A
         UserWarning tells that every triangle was dropped, or some beyond the zfar that was set, but not from within
