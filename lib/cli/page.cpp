@@ -11,15 +11,19 @@ namespace dpr::cli {
 namespace {
 
 constexpr const char* k_style = R"(<style>
+:root { color-scheme: light dark; --text: #222; --page: #fff; --quiet: #555; --line: #ddd; --frame: #bbb; }
+@media (prefers-color-scheme: dark) {
+  :root { --text: #ddd; --page: #181818; --quiet: #aaa; --line: #444; --frame: #666; }
+}
 body { font-family: system-ui, sans-serif; line-height: 1.4; max-width: 62rem; margin: 1.5rem auto; padding: 0 1rem;
-  color: #222; background: #fff; }
+  color: var(--text); background: var(--page); }
 h1 { line-height: 1.15; margin-bottom: 0.3em; }
 h2 { margin-top: 1.8em; }
-.source { color: #555; font-size: 90%; overflow-wrap: anywhere; }
+.source { color: var(--quiet); font-size: 90%; overflow-wrap: anywhere; }
 figure { margin: 0; min-width: 0; }
-figure img { display: block; width: 100%; object-fit: cover; box-sizing: border-box; border: 1px solid #bbb; }
+figure img { display: block; width: 100%; object-fit: cover; box-sizing: border-box; border: 1px solid var(--frame); }
 img.pixels { image-rendering: pixelated; }
-figcaption { font-size: 85%; color: #444; padding-top: 0.2em; }
+figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
 .pictures, .stage, .row { display: grid; gap: 0.8rem; align-items: start; }
 .pictures, .stage { grid-template-columns: repeat(auto-fit, minmax(min(100%, 9.5rem), 1fr)); }
 .stage { max-width: calc(20rem * var(--stage)); }
@@ -27,32 +31,46 @@ figcaption { font-size: 85%; color: #444; padding-top: 0.2em; }
   grid-template-columns: repeat(auto-fill, minmax(min(100%, calc(6.5rem * var(--row))), 1fr)); }
 .row { grid-template-columns: repeat(var(--row), minmax(0, 1fr)); gap: 0.3rem; }
 .controls { display: flex; gap: 0.8rem; align-items: center; max-width: 40rem; margin: 0.6rem 0; }
-.controls input { flex: 1; min-width: 0; }
+.controls input { flex: 1; min-width: 0; height: 2rem; margin: 0; }
 .controls button { font: inherit; padding: 0.4em 1em; min-width: 5.5em; }
+.wipe { max-width: 25rem; margin-top: 1.2rem; }
+.wipe .pictures { display: block; position: relative; }
+.wipe figure + figure { position: absolute; inset: 0; }
+.wipe figcaption { display: none; }
 .plot { width: 100%; }
 [hidden] { display: none; }
 table { border-collapse: collapse; margin: 1em 0; }
-td, th { padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid #ddd;
+td, th { padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line);
   font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
-th { font-weight: normal; color: #555; overflow-wrap: normal; }
+th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
 </style>
 )";
 
-// A row of the player's list is copied into its stage, and shown again whenever the slider moves.
+// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied into its stage, and shown again whenever the slider moves.
 constexpr const char* k_script = R"(<script>
+for (const wipe of document.querySelectorAll('.wipe')) {
+  const over = wipe.querySelector('figure + figure'), slider = wipe.querySelector('input');
+  slider.oninput = () => { over.style.clipPath = 'inset(0 ' + (100 - slider.value) + '% 0 0)'; };
+  slider.oninput();
+  wipe.hidden = false;
+}
 for (const player of document.querySelectorAll('.player')) {
   const rows = [...player.querySelectorAll('.row')];
   const stage = player.querySelector('.stage'), controls = player.querySelector('.controls');
   const button = controls.querySelector('button'), slider = controls.querySelector('input');
   const screens = [...rows[0].children].map(figure => stage.appendChild(figure.cloneNode(true)));
-  const show = () => screens.forEach((screen, i) => {
-    const figure = rows[slider.value].children[i];
-    const [to, from] = [screen, figure].map(f => f.querySelector('img'));
-    if (to.src !== from.src) to.src = from.src;
-    to.style.cssText = from.style.cssText;
-    to.alt = from.alt;
-    screen.querySelector('figcaption').textContent = figure.querySelector('figcaption').textContent;
-  });
+  const show = () => {
+    const figures = [...rows[slider.value].children];
+    const caption = figure => figure.querySelector('figcaption').textContent;
+    slider.ariaValueText = figures.map(caption).join(', ');
+    screens.forEach((screen, i) => {
+      const [to, from] = [screen, figures[i]].map(f => f.querySelector('img'));
+      if (to.src !== from.src) to.src = from.src;
+      to.style.cssText = from.style.cssText;
+      to.alt = from.alt;
+      screen.querySelector('figcaption').textContent = caption(figures[i]);
+    });
+  };
   let timer = 0;
   const stop = () => { clearInterval(timer); timer = 0; button.textContent = 'Play'; };
   const step = () => { slider.value = (Number(slider.value) + 1) % rows.length; show(); };
@@ -63,6 +81,7 @@ for (const player of document.querySelectorAll('.player')) {
     step();
   };
   slider.oninput = () => { stop(); show(); };
+  show();
   stage.hidden = controls.hidden = false;
   player.querySelector('details').open = false;
 }
@@ -197,6 +216,19 @@ void Page::add_player(const std::vector<Picture>& fixed, const std::vector<std::
   for (const std::vector<Picture>& pictures : rows)
     html_ += "<div class=\"row\">\n" + figures(pictures) + "</div>\n";
   html_ += "</div></details>\n</section>\n";
+}
+
+void Page::add_wipe(const Picture& first, const Picture& second) {
+  html_ += "<section class=\"wipe\" hidden>\n<div class=\"pictures\">\n" + figures({first, second}) +
+           "</div>\n<div class=\"controls\"><input type=\"range\" aria-label=\"percent that shows: " +
+           escaped(second.caption) +
+           "\" min=\"0\" max=\"100\" value=\"50\"></div>\n<p>Left: " + escaped(second.caption) +
+           ". Right: " + escaped(first.caption) + ".</p>\n</section>\n";
+}) +
+           "</div>\n<div class=\"controls\" hidden><input type=\"range\" aria-label=\"percent that shows: " +
+           escaped(second.caption) +
+           "\" min=\"0\" max=\"100\" value=\"50\"></div>\n<p hidden>Left: " + escaped(second.caption) +
+           ". Right: " + escaped(first.caption) + ".</p>\n</section>\n";
 }
 
 void Page::add_plot(const std::string& file, const std::string& caption, int width) {

@@ -45,6 +45,8 @@ class Page {
   void add_table(const std::vector<TableRow>& rows);
   /// Beside each other, as the width allows.
   void add_pictures(const std::vector<Picture>& pictures);
+  /// Two pictures of one size on one another, the second up to where a slider is; nothing without script.
+  void add_wipe(const Picture& first, const Picture& second);
   /// A slider, and a button that plays. Each row is what is seen at once, beside `fixed`, which always is.
   /// Without script all rows are shown. All rows have as many pictures; nothing is added for none.
   void add_player(const std::vector<Picture>& fixed, const std::vector<std::vector<Picture>>& rows);

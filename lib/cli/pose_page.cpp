@@ -76,6 +76,7 @@ void write_pose_page(const std::filesystem::path& file, const PageSource& source
                      const PosePictures& pictures, const std::optional<glm::dmat3>& truth) {
   Page page(source);
   page.add_pictures({pictures.target, pictures.start, pictures.end, pictures.difference});
+  page.add_wipe(pictures.target, pictures.end);
   page.add_heading("From the start to the end");
   page.add_paragraph("Start and end are rendered without smoothing, the iterations as the solver saw them." +
                      search_text(result) + light_text(result));

@@ -64,6 +64,17 @@ TEST_SUITE("unit") {
     CHECK(contains(html, "max=\"1\""));
   }
 
+  TEST_CASE("page: a wipe is hidden without script, and says which picture is which") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    page.add_wipe({"a.png", "target", 4, 2}, {"b.png", "<end>", 4, 2});
+    const std::string html = written(folder, page);
+    CHECK(contains(html, "src=\"a.png\""));
+    CHECK(contains(html, "src=\"b.png\""));
+    CHECK(contains(html, "<p>Left: &lt;end&gt;. Right: target.</p>"));
+    CHECK(contains(html, "<section class=\"wipe\" hidden>"));
+  }
+
   TEST_CASE("differences: the gain shows small ones, leaves large ones, and is said") {
     const auto grey = [](float value) { return Image(10, 10, glm::vec4(value, value, value, 1)); };
     const auto small = dpr::cli::differences({grey(0.5F)}, {grey(0.51F)});
