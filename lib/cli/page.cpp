@@ -224,11 +224,6 @@ void Page::add_wipe(const Picture& first, const Picture& second) {
            escaped(second.caption) +
            "\" min=\"0\" max=\"100\" value=\"50\"></div>\n<p>Left: " + escaped(second.caption) +
            ". Right: " + escaped(first.caption) + ".</p>\n</section>\n";
-}) +
-           "</div>\n<div class=\"controls\" hidden><input type=\"range\" aria-label=\"percent that shows: " +
-           escaped(second.caption) +
-           "\" min=\"0\" max=\"100\" value=\"50\"></div>\n<p hidden>Left: " + escaped(second.caption) +
-           ". Right: " + escaped(first.caption) + ".</p>\n</section>\n";
 }
 
 void Page::add_plot(const std::string& file, const std::string& caption, int width) {

@@ -10,9 +10,9 @@
 #include "base/output_file.hpp"
 #include "cli/bop.hpp"
 #include "cli/commands.hpp"
+#include "cli/moving_meshes.hpp"
 #include "cli/option_names.hpp"
 #include "cli/picture_camera.hpp"
-#include "cli/pose_bodies.hpp"
 #include "cli/pose_options.hpp"
 #include "cli/pose_pictures.hpp"
 #include "cli/pose_report.hpp"
@@ -31,10 +31,9 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
-                                               report;
+  std::string scene, meshes, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
+                                                       output, report;
   PosePictureFiles pictures;
-  std::vector<std::string> meshes;
   BopOptions bop;  // no folder: a scene
   std::optional<std::string> method, box;
   bool search = false, exif_focal = false;
@@ -214,12 +213,12 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
-  options.solver.meshes = parse_bodies(options.meshes, scene).front();
-  const PoseBody body(scene, options.solver.meshes);
+  options.solver.meshes = parse_moving_meshes(options.meshes, scene);
   const Device device = open_device(common);
   const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
     return PoseSolver(device, scene, target, options.solver);
   });
+  const PoseBody body(scene, options.solver.meshes);
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
@@ -347,7 +346,6 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "Numbers of the scene's meshes, from 0, that move together as one object: the pose is that of the "
           "first. The rest stand still as the scene has them, in front of the object or behind it. Needed "
           "where the scene has several meshes")
-      ->allow_extra_args(false)
       ->type_name("N[,N...]");
   add_camera_options(*command, *options);
   CLI::Option* initial =

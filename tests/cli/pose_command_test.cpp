@@ -44,6 +44,38 @@ void check_is_truth(const json& pose) {
 }  // namespace
 
 TEST_SUITE("pipeline") {
+  TEST_CASE("dpr pose --mesh: a mesh turns behind another, which stands still") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const json block{{"file", "cube.ply"},
+                     {"transform", {{0.4, 0, 0, 0.9}, {0, 0.4, 0, 0.6}, {0, 0, 0.4, 2.2}, {0, 0, 0, 1}}}};
+    for (const char* file : {"scene.json", "truth.json"}) {
+      json scene = json::parse(folder.read(file));
+      scene["meshes"].insert(scene["meshes"].begin(), block);
+      folder.write(file, scene.dump());
+    }
+    REQUIRE(run_line(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
+    const std::string line = "pose --scene scene.json --target target.exr -o pose.json --quiet ";
+    const Outcome solved = run_line(folder, line + "--mesh 1 --rotations 0 --initial-rotation 0,0.5,0");
+    CAPTURE(solved.err);
+    REQUIRE(solved.status == 0);
+    const json pose = json::parse(folder.read("pose.json"));
+    check_is_truth(pose);
+    CHECK(pose["explained"] == true);
+    CHECK(pose["meshes"] == json{1});
+    REQUIRE(pose["transforms"].size() == 1);
+    CHECK(pose["transforms"][0] == pose["transform"]);
+    for (const char* wrong :
+         {"--mesh 2", "--mesh 1,1", "--mesh -1", "--mesh cube", "--mesh ,", "--mesh 0 --mesh 1"}) {
+      CAPTURE(wrong);
+      const Outcome outcome = run_line(folder, line + wrong);
+      CHECK(outcome.status != 0);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, "--mesh"));
+    }
+  }
+
   TEST_CASE("dpr pose --search finds the pose; its file and its report hold what they promise") {
     if (is_skipped()) return;
     const TempDir folder;
