@@ -188,8 +188,9 @@ class DPR_API PoseSolver {
   using Callback = std::function<bool(const PoseIteration&)>;
 
   /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has several
-  /// meshes and the options do not say which move, the first one's transform is singular, the sizes of target, mask, silhouette or depth differ from the
-  /// scene's, one of these says nothing, the box holds nothing of the image, or an option is out of its range.
+  /// meshes and the options do not say which move, the first moving one's transform is singular, the sizes of target,
+  /// mask, silhouette or depth differ from the scene's, one of these says nothing, the box holds nothing of the image,
+  /// or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.

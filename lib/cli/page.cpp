@@ -46,7 +46,8 @@ th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
 </style>
 )";
 
-// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied into its stage, and shown again whenever the slider moves.
+// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied into
+// its stage, and shown again whenever the slider moves.
 constexpr const char* k_script = R"(<script>
 for (const wipe of document.querySelectorAll('.wipe')) {
   const over = wipe.querySelector('figure + figure'), slider = wipe.querySelector('input');

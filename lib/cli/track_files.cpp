@@ -20,11 +20,10 @@ std::string csv_text(const std::string& text) {
 
 std::string csv_vector(const glm::dvec3& v) { return format("%.9g,%.9g,%.9g", v.x, v.y, v.z); }
 
-Json row_to_json(const TrackRow& row, const Scene& scene) {
+Json row_to_json(const TrackRow& row, const Scene& scene, const PoseBody& body) {
   Json json{{"frame", row.frame}, {"file", row.file}, {"status", std::string(name_of(row.found.status))}};
   if (row.found.status != TrackStatus::lost) {
-    json.update(
-        hypothesis_to_json({.pose = row.found.pose, .loss = row.found.loss}, scene, PoseBody(scene, {})));
+    json.update(hypothesis_to_json({.pose = row.found.pose, .loss = row.found.loss}, scene, body));
     json.erase("focal_scale");
     if (!row.found.covariance.empty()) json["covariance"] = covariance_to_json(row.found.covariance);
   }
@@ -66,7 +65,8 @@ Json track_to_json(const Scene& scene, const std::vector<TrackRow>& rows, const 
     json[std::string(name_of(status))] = count(status);
   if (!error.empty()) json["error"] = error;
   Json& poses = json["poses"] = Json::array();
-  for (const TrackRow& row : rows) poses.push_back(row_to_json(row, scene));
+  const PoseBody body(scene, {});
+  for (const TrackRow& row : rows) poses.push_back(row_to_json(row, scene, body));
   return json;
 }
 
