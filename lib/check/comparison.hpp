@@ -181,7 +181,7 @@ inline void append(std::vector<double>& list, const reference::Vec3d& v) {
 template <typename Value>
 std::vector<double> flat(const std::vector<Value>& values) {
   std::vector<double> list;
-  for (const Value& v : values) append(list, v);
+  for (const Value& v : values) check::append(list, v);
   return list;
 }
 
@@ -203,7 +203,7 @@ inline std::vector<Block> blocks_of(const reference::Lights& grad) {
   std::vector<Block> blocks;
   reference::for_each_light_value(grad, [&](const char* name, const auto& value) {
     if (blocks.empty() || blocks.back().name != name) blocks.push_back({name, {}, {}});
-    append(blocks.back().found, value);
+    check::append(blocks.back().found, value);
   });
   return blocks;
 }

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <string>
 
+namespace from_chars_test {
+
 #ifdef __cpp_lib_to_chars
 TEST_SUITE("unit") {
   TEST_CASE("from_chars: numbers, their ends and their errors are the same by strtod") {
@@ -66,3 +68,5 @@ TEST_SUITE("unit") {
   }
 }
 #endif
+
+}  // namespace from_chars_test

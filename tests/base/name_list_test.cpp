@@ -8,6 +8,8 @@
 #include "dpr/error.hpp"
 #include "support/messages.hpp"
 
+namespace name_list_test {
+
 TEST_SUITE("unit") {
   TEST_CASE("a list is split at commas, without the spaces around its items") {
     using List = std::vector<std::string>;
@@ -25,3 +27,5 @@ TEST_SUITE("unit") {
                           "cull: got \"fron\", expected none, back or front");
   }
 }
+
+}  // namespace name_list_test

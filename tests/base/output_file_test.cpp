@@ -15,6 +15,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace output_file_test {
+
 using namespace dpr;
 using dpr::test::FileSizeLimit;
 using dpr::test::TempDir;
@@ -149,3 +151,5 @@ TEST_SUITE("robustness") {
     CHECK(fs::is_character_file("/dev/full"));
   }
 }
+
+}  // namespace output_file_test

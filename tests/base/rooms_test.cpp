@@ -10,6 +10,8 @@
 
 #include "support/data.hpp"
 
+namespace rooms_test {
+
 namespace {
 
 /// From the ground up.
@@ -49,3 +51,5 @@ TEST_SUITE("unit") {
     CHECK(arrows > 100);
   }
 }
+
+}  // namespace rooms_test

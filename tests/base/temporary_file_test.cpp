@@ -13,6 +13,8 @@
 
 #include "support/temp_dir.hpp"
 
+namespace temporary_file_test {
+
 using dpr::TemporaryFile;
 using dpr::test::TempDir;
 
@@ -87,3 +89,5 @@ TEST_SUITE("robustness") {
     close(descriptor);
   }
 }
+
+}  // namespace temporary_file_test

@@ -10,6 +10,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace bench_cli_test {
+
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
@@ -161,3 +163,5 @@ TEST_SUITE("bench-smoke") {
     check_fails(folder, {"--compare", "empty.json", "empty.json", "--quiet"}, "--quiet");
   }
 }
+
+}  // namespace bench_cli_test

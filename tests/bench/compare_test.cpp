@@ -9,6 +9,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace compare_test {
+
 using dpr::bench::compare;
 using dpr::bench::Json;
 using dpr::bench::read_results;
@@ -153,3 +155,5 @@ TEST_SUITE("bench-smoke") {
     CHECK_THROWS_AS(read_results(folder.write("broken.json", "{")), dpr::IoError);
   }
 }
+
+}  // namespace compare_test

@@ -9,6 +9,8 @@
 #include "cli/json.hpp"
 #include "support/command.hpp"
 
+namespace experiments_test {
+
 using dpr::cli::Json;
 using dpr::test::TempDir;
 
@@ -201,3 +203,5 @@ TEST_SUITE("bench-smoke") {
     }
   }
 }
+
+}  // namespace experiments_test

@@ -12,6 +12,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace measure_test {
+
 using namespace dpr;
 using bench::Json;
 
@@ -206,3 +208,5 @@ TEST_SUITE("unit") {
     CHECK(bench::milliseconds_by_stage(launches) == std::map<std::string, double>{{"scan", 4}, {"sort", 2}});
   }
 }
+
+}  // namespace measure_test

@@ -23,6 +23,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace perturbed_pose_test {
+
 using namespace dpr;
 using namespace dpr::bench;
 using dpr::test::reduced;
@@ -522,3 +524,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace perturbed_pose_test

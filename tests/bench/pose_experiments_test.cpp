@@ -18,6 +18,8 @@
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
+namespace pose_experiments_test {
+
 namespace {
 
 using dpr::bench::PoseProblem;
@@ -150,3 +152,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace pose_experiments_test

@@ -13,6 +13,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace bop_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -134,3 +136,5 @@ TEST_SUITE("robustness") {
           "3.cam_K (data/test/000002/scene_camera.json)");
   }
 }
+
+}  // namespace bop_command_test

@@ -9,6 +9,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace completion_test {
+
 namespace {
 
 using dpr::test::is_skipped;
@@ -77,3 +79,5 @@ TEST_SUITE("pipeline") {
     CHECK(dpr::test::is_error_line(outcome.err));
   }
 }
+
+}  // namespace completion_test

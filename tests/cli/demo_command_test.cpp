@@ -11,6 +11,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace demo_command_test {
+
 using dpr::test::contains;
 using dpr::test::is_skipped;
 using dpr::test::run_command;
@@ -61,3 +63,5 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(dpr::read_mesh(folder / "mesh.ply").vertex_colors.empty());
   }
 }
+
+}  // namespace demo_command_test

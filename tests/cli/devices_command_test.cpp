@@ -6,6 +6,8 @@
 
 #include "support/command.hpp"
 
+namespace devices_command_test {
+
 using namespace dpr::test;
 
 TEST_SUITE("pipeline") {
@@ -44,3 +46,5 @@ TEST_SUITE("pipeline") {
     CHECK(lanes.err == "dpr: error: DPR_LANES (environment): got '4', expected 1, 8 or 16\n");
   }
 }
+
+}  // namespace devices_command_test

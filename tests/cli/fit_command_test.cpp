@@ -13,6 +13,8 @@
 #include "support/messages.hpp"
 #include "support/several_devices.hpp"
 
+namespace fit_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -397,3 +399,5 @@ TEST_SUITE("robustness") {
     CHECK(contains(templateless.err, "initial"));
   }
 }
+
+}  // namespace fit_command_test

@@ -9,6 +9,8 @@
 #include "support/command.hpp"
 #include "support/interruptions.hpp"
 
+namespace fit_interruption_test {
+
 namespace {
 
 using dpr::test::TempDir;
@@ -72,3 +74,5 @@ TEST_SUITE("robustness") {
     CHECK(folder.entries() == inputs + 2);
   }
 }
+
+}  // namespace fit_interruption_test

@@ -9,6 +9,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace info_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -123,3 +125,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace info_command_test

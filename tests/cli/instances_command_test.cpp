@@ -9,6 +9,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace instances_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -71,3 +73,5 @@ TEST_SUITE("pipeline") {
     CHECK(contains(pose.err, "--mesh (command line): got none, expected numbers of the scene's meshes"));
   }
 }
+
+}  // namespace instances_command_test

@@ -11,6 +11,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace lens_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -71,3 +73,5 @@ TEST_SUITE("pipeline") {
     CHECK(contains(wrong.err, "--lens-tolerance (command line): got -1"));
   }
 }
+
+}  // namespace lens_command_test

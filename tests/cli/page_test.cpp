@@ -8,6 +8,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace page_test {
+
 namespace {
 
 using dpr::Image;
@@ -94,3 +96,5 @@ TEST_SUITE("unit") {
     CHECK(dpr::cli::duration_text(7200) == "2.0 h");
   }
 }
+
+}  // namespace page_test

@@ -12,6 +12,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace pose_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -303,3 +305,5 @@ TEST_SUITE("robustness") {
     check("--silhouette target.exr --iterations 4", "those of least squares with those of the descent");
   }
 }
+
+}  // namespace pose_command_test

@@ -12,6 +12,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace pose_pictures_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -181,3 +183,5 @@ TEST_SUITE("robustness") {
     CHECK_FALSE(std::filesystem::exists(folder / "pose.json"));
   }
 }
+
+}  // namespace pose_pictures_test

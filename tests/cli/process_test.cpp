@@ -18,6 +18,8 @@
 #include "support/messages.hpp"
 #include "support/process.hpp"
 
+namespace process_test {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -182,3 +184,5 @@ TEST_SUITE("robustness") {
     CHECK(contains(escape.err, "no\\x0a\\x1b[31m.ply"));
   }
 }
+
+}  // namespace process_test

@@ -10,6 +10,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace render_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -190,3 +192,5 @@ TEST_SUITE("robustness") {
     CHECK(contains(outcome.err, "none/cube.png"));
   }
 }
+
+}  // namespace render_command_test

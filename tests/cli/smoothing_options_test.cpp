@@ -17,6 +17,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace smoothing_options_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 using nlohmann::json;
@@ -261,3 +263,5 @@ TEST_SUITE("robustness") {
     CHECK(*options.seed == std::uint64_t{1} << 53U);
   }
 }
+
+}  // namespace smoothing_options_test

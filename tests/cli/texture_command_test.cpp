@@ -11,6 +11,8 @@
 #include "support/data.hpp"
 #include "support/messages.hpp"
 
+namespace texture_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -110,3 +112,5 @@ TEST_SUITE("pipeline") {
           1);
   }
 }
+
+}  // namespace texture_command_test

@@ -20,6 +20,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace track_command_test {
+
 namespace {
 
 using dpr::test::contains;
@@ -298,3 +300,5 @@ TEST_SUITE("robustness") {
     check("--sequence frames --sigma 1", "unknown option \"--sigma\"");
   }
 }
+
+}  // namespace track_command_test

@@ -5,6 +5,8 @@
 
 #include "support/probe.hpp"
 
+namespace buffer_test {
+
 using dpr::test::device_impl;
 
 TEST_SUITE("unit") {
@@ -28,3 +30,5 @@ TEST_SUITE("unit") {
     CHECK(buffer.capacity_bytes() == 0);
   }
 }
+
+}  // namespace buffer_test

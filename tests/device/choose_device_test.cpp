@@ -13,6 +13,8 @@
 #include "support/messages.hpp"
 #include "support/several_devices.hpp"
 
+namespace choose_device_test {
+
 using dpr::by_preference;
 using dpr::Device;
 using dpr::DeviceError;
@@ -171,3 +173,5 @@ TEST_SUITE("unit") {
     CHECK(matches(info, ""));
   }
 }
+
+}  // namespace choose_device_test

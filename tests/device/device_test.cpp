@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/variable.hpp"
 
+namespace device_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -216,3 +218,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(DeviceError, describe(cl::Platform::getDefault(), cl::Device()), "clGetDeviceInfo");
   }
 }
+
+}  // namespace device_test

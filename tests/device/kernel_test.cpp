@@ -8,6 +8,8 @@
 #include "support/messages.hpp"
 #include "support/probe.hpp"
 
+namespace kernel_test {
+
 namespace {
 
 using dpr::test::device_impl;
@@ -74,3 +76,5 @@ TEST_SUITE("unit") {
     DPR_CHECK_MESSAGE_HAS(std::logic_error, dpr::kernel_file("nothing.cl"), "nothing.cl");
   }
 }
+
+}  // namespace kernel_test

@@ -9,6 +9,8 @@
 #include "shared_types.h"
 #include "support/probe.hpp"
 
+namespace layout_test {
+
 namespace {
 
 namespace shared = dpr::shared;
@@ -287,3 +289,5 @@ TEST_SUITE("unit") {
     CHECK(wrong[4] == "offset_of(LightingParams, harmonics) is 48");
   }
 }
+
+}  // namespace layout_test

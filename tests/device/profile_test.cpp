@@ -5,6 +5,8 @@
 
 #include "dpr/dpr.hpp"
 
+namespace profile_test {
+
 using namespace dpr;
 
 TEST_SUITE("unit") {
@@ -35,3 +37,5 @@ TEST_SUITE("unit") {
     CHECK(impl_of(device).profile == nullptr);
   }
 }
+
+}  // namespace profile_test

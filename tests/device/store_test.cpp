@@ -18,6 +18,8 @@
 #include "support/temp_dir.hpp"
 #include "support/variable.hpp"
 
+namespace store_test {
+
 using dpr::Store;
 using dpr::test::TempDir;
 using dpr::test::Variable;
@@ -169,3 +171,5 @@ TEST_SUITE("unit") {
     CHECK(builds == 2);
   }
 }
+
+}  // namespace store_test

@@ -14,6 +14,8 @@
 #include "support/caller.hpp"
 #include "support/reduced.hpp"
 
+namespace threads_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -147,3 +149,5 @@ TEST_SUITE("robustness") {
     check_threads(devices);
   }
 }
+
+}  // namespace threads_test

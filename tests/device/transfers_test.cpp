@@ -8,6 +8,8 @@
 #include "device/buffer.hpp"
 #include "support/reduced.hpp"
 
+namespace transfers_test {
+
 using dpr::Buffer;
 using dpr::TransferCounts;
 namespace cl = dpr::cl;
@@ -86,3 +88,5 @@ TEST_SUITE("unit") {
     CHECK(found == values);
   }
 }
+
+}  // namespace transfers_test

@@ -13,6 +13,8 @@
 
 #include "support/command.hpp"
 
+namespace commands_test {
+
 using namespace dpr::test;
 
 namespace {
@@ -150,3 +152,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace commands_test

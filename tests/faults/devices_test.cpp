@@ -16,6 +16,8 @@
 #include "support/messages.hpp"
 #include "support/several_devices.hpp"
 
+namespace devices_test {
+
 using namespace dpr;
 using namespace dpr::test;
 using namespace dpr::test::pipeline;
@@ -229,3 +231,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace devices_test

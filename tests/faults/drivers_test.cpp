@@ -12,6 +12,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace drivers_test {
+
 using namespace dpr::test;
 
 namespace {
@@ -194,3 +196,5 @@ TEST_SUITE("robustness") {
     CHECK(contains(outcome.err, "POCL_CACHE_DIR"));
   }
 }
+
+}  // namespace drivers_test

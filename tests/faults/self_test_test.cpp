@@ -10,6 +10,8 @@
 
 #include "support/command.hpp"
 
+namespace self_test_test {
+
 using namespace dpr::test;
 
 namespace {
@@ -79,3 +81,5 @@ TEST_SUITE("robustness") {
     CHECK(outcome.out.find("1 failed") != std::string::npos);
   }
 }
+
+}  // namespace self_test_test

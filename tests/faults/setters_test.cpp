@@ -14,6 +14,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
+namespace setters_test {
+
 using namespace dpr;
 using namespace dpr::test;
 using namespace dpr::test::pipeline;
@@ -296,3 +298,5 @@ TEST_SUITE("robustness") {
     CHECK(faults > 0);
   }
 }
+
+}  // namespace setters_test

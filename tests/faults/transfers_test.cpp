@@ -13,6 +13,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/caller.hpp"
 
+namespace transfers_test {
+
 using namespace dpr;
 using namespace dpr::test;
 using namespace dpr::test::pipeline;
@@ -182,3 +184,5 @@ TEST_SUITE("pipeline") {
     CHECK(dpr_opencl_calls("clEnqueueRead*") > 0);
   }
 }
+
+}  // namespace transfers_test

@@ -9,6 +9,8 @@
 #include "fuzz/targets.hpp"
 #include "support/data.hpp"
 
+namespace corpus_test {
+
 using namespace dpr;
 
 TEST_SUITE("robustness") {
@@ -28,3 +30,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace corpus_test

@@ -24,6 +24,8 @@
 #include "support/data.hpp"
 #include "support/reduced.hpp"
 
+namespace gradient_fuzz_test {
+
 using namespace dpr;
 using namespace dpr::test::gradients;
 
@@ -570,3 +572,5 @@ TEST_SUITE("gradient-fuzz") {
     }
   }
 }
+
+}  // namespace gradient_fuzz_test

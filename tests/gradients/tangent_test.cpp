@@ -12,6 +12,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace tangent_test {
+
 using namespace dpr;
 using namespace dpr::check;
 using namespace dpr::test::gradients;
@@ -208,3 +210,5 @@ TEST_SUITE("tangents") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, tangent(none), "Monte Carlo");
   }
 }
+
+}  // namespace tangent_test

@@ -14,6 +14,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace image_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 
@@ -211,10 +213,6 @@ TEST_SUITE("robustness") {
   TEST_CASE("truncated images") {
     const TempDir folder;
     for (const std::string extension : {".png", ".exr", ".tif", ".tga", ".jpg"}) {
-#ifdef __SANITIZE_ADDRESS__
-      // libpng jumps over a destructor in OpenImageIO, which leaks the text of its message.
-      if (extension == ".png") continue;
-#endif
       write_image(folder / ("whole" + extension), Image(64, 64, glm::vec4(0.3F)));
       const std::string whole = folder.read("whole" + extension);
       const auto cut = folder.write("cut" + extension, whole.substr(0, whole.size() / 2));
@@ -292,3 +290,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, vstack({Image(1, 2)}, -1), "gap (vstack)");
   }
 }
+
+}  // namespace image_test

@@ -12,6 +12,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace texture_file_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 
@@ -80,3 +82,5 @@ TEST_SUITE("unit") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(bad), "filter (texture): got -1");
   }
 }
+
+}  // namespace texture_file_test

@@ -10,7 +10,7 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
-namespace dpr::test {
+namespace dpr::test::command_test {
 namespace {
 
 Outcome learn(const TempDir& folder, const std::vector<std::string>& arguments) {
@@ -81,4 +81,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::command_test

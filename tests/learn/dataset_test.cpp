@@ -13,7 +13,7 @@
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
-namespace dpr::test {
+namespace dpr::test::dataset_test {
 namespace {
 
 using namespace learn;
@@ -156,4 +156,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::dataset_test

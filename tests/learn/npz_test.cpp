@@ -9,7 +9,7 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
-namespace dpr::test {
+namespace dpr::test::npz_test {
 namespace {
 
 using learn::ByteArray;
@@ -152,4 +152,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::npz_test

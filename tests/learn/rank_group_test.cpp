@@ -13,7 +13,7 @@
 #include "support/free_port.hpp"
 #include "support/messages.hpp"
 
-namespace dpr::test {
+namespace dpr::test::rank_group_test {
 namespace {
 
 using namespace learn;
@@ -205,4 +205,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::rank_group_test

@@ -19,7 +19,7 @@
 #include "support/network.hpp"
 #include "support/process.hpp"
 
-namespace dpr::test {
+namespace dpr::test::ranks_command_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -259,4 +259,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::ranks_command_test

@@ -9,7 +9,7 @@
 #include "dpr/error.hpp"
 #include "support/messages.hpp"
 
-namespace dpr::test {
+namespace dpr::test::ranks_test {
 namespace {
 
 using learn::Ranks;
@@ -105,4 +105,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::ranks_test

@@ -6,7 +6,7 @@
 #include "support/command.hpp"
 #include "support/interruptions.hpp"
 
-namespace dpr::test {
+namespace dpr::test::train_interruption_test {
 
 TEST_SUITE("robustness") {
   TEST_CASE("dpr learn train: killed 20 times it ends with the losses of an undisturbed run") {
@@ -38,4 +38,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::train_interruption_test

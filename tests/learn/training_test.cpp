@@ -13,7 +13,7 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
-namespace dpr::test {
+namespace dpr::test::training_test {
 namespace {
 
 using namespace learn;
@@ -209,4 +209,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test
+}  // namespace dpr::test::training_test

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+namespace cluster_vertices_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -64,3 +66,5 @@ TEST_SUITE("unit") {
     CHECK(kept.faces == aside.faces);
   }
 }
+
+}  // namespace cluster_vertices_test

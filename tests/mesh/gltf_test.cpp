@@ -12,6 +12,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace gltf_test {
+
 using namespace dpr;
 using dpr::test::contains;
 using dpr::test::TempDir;
@@ -319,3 +321,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace gltf_test

@@ -5,6 +5,8 @@
 
 #include <initializer_list>
 
+namespace mesh_facts_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -84,3 +86,5 @@ TEST_SUITE("unit") {
     CHECK_FALSE(facts_of({{0, 0, 0}}).is_closed());
   }
 }
+
+}  // namespace mesh_facts_test

@@ -16,6 +16,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace mesh_io_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 
@@ -733,3 +735,5 @@ TEST_SUITE("robustness") {
     CHECK(folder.entries() == 1);  // the folder made above, and no temporary file
   }
 }
+
+}  // namespace mesh_io_test

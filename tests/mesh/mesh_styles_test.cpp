@@ -12,6 +12,8 @@
 
 #include "mesh/mesh_reader.hpp"
 
+namespace mesh_styles_test {
+
 using namespace dpr;
 
 namespace {
@@ -524,3 +526,5 @@ TEST_SUITE("robustness") {
     CHECK_FALSE(is_read("random.obj", content, other));
   }
 }
+
+}  // namespace mesh_styles_test

@@ -8,6 +8,8 @@
 #include "dpr/light.hpp"
 #include "support/messages.hpp"
 
+namespace mesh_test {
+
 using namespace dpr;
 
 namespace {
@@ -166,3 +168,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud or blinn");
   }
 }
+
+}  // namespace mesh_test

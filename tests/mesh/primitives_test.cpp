@@ -10,6 +10,8 @@
 #include "dpr/mesh.hpp"
 #include "support/messages.hpp"
 
+namespace primitives_test {
+
 using namespace dpr;
 
 namespace {
@@ -150,3 +152,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, make_torus(1, 1, 2, 8), "segments (make_torus): got 2");
   }
 }
+
+}  // namespace primitives_test

@@ -14,6 +14,8 @@
 #include "dpr/voxels.hpp"
 #include "mesh/adjacency.hpp"
 
+namespace remesh_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -109,3 +111,5 @@ TEST_SUITE("unit") {
     CHECK_THROWS_AS(dpr::remesh(dpr::make_icosphere(1), 1e-4F), dpr::InvalidArgument);
   }
 }
+
+}  // namespace remesh_test

@@ -6,6 +6,8 @@
 #include "dpr/mesh.hpp"
 #include "mesh/solid.hpp"
 
+namespace solid_test {
+
 using namespace dpr;
 
 namespace {
@@ -83,3 +85,5 @@ TEST_SUITE("unit") {
     CHECK(winding_of(ball) == 0);
   }
 }
+
+}  // namespace solid_test

@@ -14,6 +14,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace surface_files_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 
@@ -309,3 +311,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace surface_files_test

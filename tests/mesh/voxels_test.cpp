@@ -11,6 +11,8 @@
 
 #include "dpr/error.hpp"
 
+namespace voxels_test {
+
 using dpr::Bounds;
 using dpr::FillRule;
 using dpr::Mesh;
@@ -160,3 +162,5 @@ TEST_SUITE("robustness") {
                     dpr::InvalidArgument);
   }
 }
+
+}  // namespace voxels_test

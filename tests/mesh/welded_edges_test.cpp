@@ -7,6 +7,8 @@
 
 #include "dpr/mesh.hpp"
 
+namespace welded_edges_test {
+
 using dpr::Mesh;
 using dpr::WeldedEdge;
 
@@ -89,3 +91,5 @@ TEST_SUITE("unit") {
     CHECK(edges_of({}).empty());
   }
 }
+
+}  // namespace welded_edges_test

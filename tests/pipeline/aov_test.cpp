@@ -20,6 +20,8 @@
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
+namespace aov_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -375,3 +377,5 @@ TEST_SUITE("robustness") {
     CHECK(aov_image(found, Aov::depth).pixels[7].a == 0);
   }
 }
+
+}  // namespace aov_test

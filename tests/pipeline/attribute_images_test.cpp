@@ -17,6 +17,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace attribute_images_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -588,3 +590,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, parse_attribute("deep", "x"), "depth, position");
   }
 }
+
+}  // namespace attribute_images_test

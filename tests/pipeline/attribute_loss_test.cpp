@@ -11,6 +11,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace attribute_loss_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -140,3 +142,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, ImageLoss(device, LossOptions{}, colors), "weights");
   }
 }
+
+}  // namespace attribute_loss_test

@@ -15,6 +15,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace attributes_on_device_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -412,3 +414,5 @@ TEST_SUITE("robustness") {
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_view(depth, name), "name (gradient_view)");
   }
 }
+
+}  // namespace attributes_on_device_test

@@ -7,6 +7,8 @@
 #include "renderer/renderer_impl.hpp"
 #include "support/reduced.hpp"
 
+namespace back_faces_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -154,3 +156,5 @@ TEST_SUITE("pipeline") {
     CHECK(see(scene).kept > kept);
   }
 }
+
+}  // namespace back_faces_test

@@ -12,6 +12,8 @@
 #include "support/opencv_points.hpp"
 #include "support/probe.hpp"
 
+namespace cameras_test {
+
 using namespace dpr;
 using dpr::test::OpencvCase;
 
@@ -228,3 +230,5 @@ TEST_SUITE("robustness") {
     CHECK(renderer.image(1).pixels != alone.pixels);
   }
 }
+
+}  // namespace cameras_test

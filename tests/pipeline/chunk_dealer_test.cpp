@@ -6,6 +6,8 @@
 #include <thread>
 #include <vector>
 
+namespace chunk_dealer_test {
+
 using dpr::Chunk;
 using dpr::ChunkDealer;
 using dpr::make_chunks;
@@ -130,3 +132,5 @@ TEST_SUITE("unit") {
     CHECK_FALSE(dealer.is_done());
   }
 }
+
+}  // namespace chunk_dealer_test

@@ -12,6 +12,8 @@
 #include "renderer/renderer_impl.hpp"
 #include "support/messages.hpp"
 
+namespace clip_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -300,3 +302,5 @@ TEST_SUITE("pipeline") {
     CHECK(impl_of(renderer).frame.clips == 0);
   }
 }
+
+}  // namespace clip_test

@@ -11,6 +11,8 @@
 #include "support/data.hpp"
 #include "support/reduced.hpp"
 
+namespace conformance_test {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -128,3 +130,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace conformance_test

@@ -7,6 +7,8 @@
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 
+namespace cull_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -109,3 +111,5 @@ TEST_SUITE("pipeline") {
     CHECK(same_bits(render(renderer), whole));
   }
 }
+
+}  // namespace cull_test

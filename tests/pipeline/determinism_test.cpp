@@ -11,6 +11,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace determinism_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -306,3 +308,5 @@ TEST_SUITE("pipeline") {
     CHECK(same_bits(render(renderer), render(device, other)));
   }
 }
+
+}  // namespace determinism_test

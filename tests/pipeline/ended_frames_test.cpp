@@ -9,7 +9,7 @@
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::test::pipeline::ended_frames_test {
 namespace {
 
 using Setter = std::function<void(Renderer&)>;
@@ -81,4 +81,4 @@ TEST_SUITE("robustness") {
   }
 }
 
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::test::pipeline::ended_frames_test

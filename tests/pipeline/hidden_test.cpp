@@ -8,6 +8,8 @@
 #include "pipeline/determinism.hpp"
 #include "renderer/renderer_impl.hpp"
 
+namespace hidden_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -143,3 +145,5 @@ TEST_SUITE("pipeline") {
     CHECK(banded.statistics().bands > 1);
   }
 }
+
+}  // namespace hidden_test

@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/variable.hpp"
 
+namespace host_waits_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 
@@ -202,3 +204,5 @@ TEST_SUITE("pipeline") {
     CHECK(equals_fresh_render(renderer));
   }
 }
+
+}  // namespace host_waits_test

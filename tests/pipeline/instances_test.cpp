@@ -17,7 +17,7 @@
 #include "support/reduced.hpp"
 #include "support/several_devices.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::test::pipeline::instances_test {
 namespace {
 
 /// A mesh with a texture, materials and normals of its own, one with colours of its vertices, and three
@@ -317,4 +317,4 @@ TEST_SUITE("gradient") {
 }
 
 }  // namespace
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::test::pipeline::instances_test

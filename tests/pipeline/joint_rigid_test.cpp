@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace joint_rigid_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::is_reduced;
@@ -266,3 +268,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace joint_rigid_test

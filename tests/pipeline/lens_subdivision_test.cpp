@@ -13,6 +13,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
+namespace lens_subdivision_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -227,3 +229,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace lens_subdivision_test

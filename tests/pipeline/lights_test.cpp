@@ -13,6 +13,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace lights_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -185,3 +187,5 @@ TEST_SUITE("pipeline") {
     CHECK(std::sqrt(difference / size) < 0.01);
   }
 }
+
+}  // namespace lights_test

@@ -7,6 +7,8 @@
 #include "support/data.hpp"
 #include "support/reduced.hpp"
 
+namespace mitsuba_test {
+
 using namespace dpr;
 
 namespace {
@@ -62,3 +64,5 @@ TEST_SUITE("pipeline") {
     CHECK(difference() > 3.0 / 255);
   }
 }
+
+}  // namespace mitsuba_test

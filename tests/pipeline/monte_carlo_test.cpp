@@ -19,6 +19,8 @@
 #include "support/estimates.hpp"
 #include "support/reduced.hpp"
 
+namespace monte_carlo_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -335,3 +337,5 @@ TEST_SUITE("statistical") {
     CHECK(shifts.size() >= static_cast<std::size_t>(reduced(4, 2)));
   }
 }
+
+}  // namespace monte_carlo_test

@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/several_devices.hpp"
 
+namespace multi_device_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::is_divisible;
@@ -375,3 +377,5 @@ TEST_SUITE("robustness") {
     CHECK(renderer.render().size() == 3);
   }
 }
+
+}  // namespace multi_device_test

@@ -18,6 +18,8 @@
 #include "support/caller.hpp"
 #include "support/messages.hpp"
 
+namespace on_device_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -626,3 +628,5 @@ TEST_SUITE("robustness") {
     CHECK(dpr::test::pipeline::same_bits(read_image(caller, renderer), fresh.image()));
   }
 }
+
+}  // namespace on_device_test

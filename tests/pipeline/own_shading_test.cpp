@@ -12,6 +12,8 @@
 #include "pipeline/determinism.hpp"
 #include "support/messages.hpp"
 
+namespace own_shading_test {
+
 using namespace dpr;
 using namespace dpr::test;
 using namespace dpr::test::gradients;
@@ -285,3 +287,5 @@ TEST_SUITE("pipeline") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.samples(), "a scene with lights");
   }
 }
+
+}  // namespace own_shading_test

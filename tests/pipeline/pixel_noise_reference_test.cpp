@@ -14,6 +14,8 @@
 #include "reference/pixel_noise.hpp"
 #include "support/reduced.hpp"
 
+namespace pixel_noise_reference_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -248,3 +250,5 @@ TEST_SUITE("gradient") {
     check_gradients(blurred(cut_cube(), 2, 1e-8F), at_cuts(k_cut));
   }
 }
+
+}  // namespace pixel_noise_reference_test

@@ -17,6 +17,8 @@
 #include "support/messages.hpp"
 #include "support/worst.hpp"
 
+namespace pixel_noise_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -738,3 +740,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace pixel_noise_test

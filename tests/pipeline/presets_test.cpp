@@ -15,6 +15,8 @@
 #include "renderer/renderer_impl.hpp"
 #include "support/reduced.hpp"
 
+namespace presets_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -332,3 +334,5 @@ TEST_SUITE("statistical") {
     }
   }
 }
+
+}  // namespace presets_test

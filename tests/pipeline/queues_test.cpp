@@ -10,6 +10,8 @@
 #include "pipeline/determinism.hpp"
 #include "support/caller.hpp"
 
+namespace queues_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -144,3 +146,5 @@ TEST_SUITE("pipeline") {
     check_queue(caller, adopt_device(caller.context(), caller.queue()), caller.queue);
   }
 }
+
+}  // namespace queues_test

@@ -12,6 +12,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
+namespace reference_render_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -456,3 +458,5 @@ TEST_SUITE("pipeline") {
     CHECK_FALSE(delicate.kink[8 * 7 + 7]);
   }
 }
+
+}  // namespace reference_render_test

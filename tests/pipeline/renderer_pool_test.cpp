@@ -10,6 +10,8 @@
 #include "dpr/error.hpp"
 #include "pipeline/scenes.hpp"
 
+namespace renderer_pool_test {
+
 using namespace dpr;
 using namespace dpr::batch;
 
@@ -87,3 +89,5 @@ TEST_SUITE("pipeline") {
     CHECK_THROWS_AS(bytes_after(narrow.array(), 16), InvalidArgument);
   }
 }
+
+}  // namespace renderer_pool_test

@@ -15,6 +15,8 @@
 #include "support/integer_rasterizer.hpp"
 #include "support/reduced.hpp"
 
+namespace rigid_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::GridPoint;
@@ -347,3 +349,5 @@ TEST_SUITE("pipeline") {
                     << " of them on edges");
   }
 }
+
+}  // namespace rigid_test

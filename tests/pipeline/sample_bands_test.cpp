@@ -11,6 +11,8 @@
 #include "renderer/renderer_impl.hpp"
 #include "support/reduced.hpp"
 
+namespace sample_bands_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::is_reduced;
@@ -233,3 +235,5 @@ TEST_SUITE("pipeline") {
     CHECK(device.peak_allocated_bytes() < 100'000'000);
   }
 }
+
+}  // namespace sample_bands_test

@@ -14,6 +14,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace sampling_error_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -253,3 +255,5 @@ TEST_SUITE("robustness") {
     CHECK(suggest_samples(1, 8, 1e-9) == 1U << 20U);
   }
 }
+
+}  // namespace sampling_error_test

@@ -16,7 +16,7 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::test::pipeline::scene_batch_test {
 namespace {
 
 int width() { return reduced(24, 9); }
@@ -329,4 +329,4 @@ TEST_SUITE("pipeline") {
 }
 
 }  // namespace
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::test::pipeline::scene_batch_test

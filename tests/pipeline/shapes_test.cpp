@@ -10,7 +10,7 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
-namespace dpr::test::pipeline {
+namespace dpr::test::pipeline::shapes_test {
 namespace {
 
 /// Two meshes, one with colours of its vertices and one of its faces, and as many views as shapes.
@@ -196,4 +196,4 @@ TEST_SUITE("pipeline") {
   }
 }
 
-}  // namespace dpr::test::pipeline
+}  // namespace dpr::test::pipeline::shapes_test

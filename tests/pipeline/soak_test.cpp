@@ -10,6 +10,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
+namespace soak_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -84,3 +86,5 @@ TEST_SUITE("robustness") {
     CHECK(device.allocated_bytes() == 0);
   }
 }
+
+}  // namespace soak_test

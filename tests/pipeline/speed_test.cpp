@@ -11,6 +11,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
+namespace speed_test {
+
 using namespace dpr;
 
 namespace {
@@ -70,3 +72,5 @@ TEST_SUITE("bench-smoke") {
     }
   }
 }
+
+}  // namespace speed_test

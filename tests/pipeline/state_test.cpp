@@ -13,6 +13,8 @@
 #include "support/caller.hpp"
 #include "support/reduced.hpp"
 
+namespace state_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::Caller;
@@ -223,3 +225,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace state_test

@@ -17,6 +17,8 @@
 #include "support/reduced.hpp"
 #include "support/several_devices.hpp"
 
+namespace surface_light_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -328,3 +330,5 @@ TEST_SUITE("pipeline") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_materials(0, materials), "shininess of materials[1]");
   }
 }
+
+}  // namespace surface_light_test

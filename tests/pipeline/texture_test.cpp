@@ -16,6 +16,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace texture_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -340,3 +342,5 @@ TEST_SUITE("gradient") {
     for (const glm::vec3& g : gradient.meshes[0].positions) CHECK(std::isfinite(g.x + g.y + g.z));
   }
 }
+
+}  // namespace texture_test

@@ -9,6 +9,8 @@
 #include <numeric>
 #include <vector>
 
+namespace reference_aggregate_test {
+
 using namespace dpr::reference;
 
 namespace {
@@ -259,3 +261,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace reference_aggregate_test

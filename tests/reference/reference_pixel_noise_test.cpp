@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+namespace reference_pixel_noise_test {
+
 using namespace dpr::reference;
 
 namespace {
@@ -295,3 +297,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace reference_pixel_noise_test

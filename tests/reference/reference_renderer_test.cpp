@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+namespace reference_renderer_test {
+
 using namespace dpr::reference;
 
 namespace {
@@ -341,3 +343,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace reference_renderer_test

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+namespace reference_test {
+
 using namespace dpr::reference;
 
 TEST_SUITE("unit") {
@@ -388,3 +390,5 @@ TEST_SUITE("gradient") {
     CHECK_THROWS_AS(evaluate_loss(Loss::mse, image, make_image(2, 3)), std::invalid_argument);
   }
 }
+
+}  // namespace reference_test

@@ -15,6 +15,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace api_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 using dpr::test::reduced;
@@ -555,3 +557,5 @@ TEST_SUITE("robustness") {
     MESSAGE(count << " combinations");
   }
 }
+
+}  // namespace api_test

@@ -12,6 +12,8 @@
 #include "support/command.hpp"
 #include "support/messages.hpp"
 
+namespace cli_test {
+
 using dpr::test::is_error_line;
 using dpr::test::is_skipped;
 using dpr::test::Outcome;
@@ -397,3 +399,5 @@ TEST_SUITE("robustness") {
     CHECK_FALSE(is_error_line("dpr: error: mesh\nand a second line\n"));
   }
 }
+
+}  // namespace cli_test

@@ -11,6 +11,8 @@
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 
+namespace scales_test {
+
 using namespace dpr;
 using namespace dpr::test::pipeline;
 
@@ -148,3 +150,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, gradient_of(renderer, scene, 1e25F), "gradient of ");
   }
 }
+
+}  // namespace scales_test

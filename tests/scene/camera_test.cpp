@@ -8,6 +8,8 @@
 
 #include "support/messages.hpp"
 
+namespace camera_test {
+
 using namespace dpr;
 
 namespace {
@@ -192,3 +194,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, orbit_camera(1, 0, k_nan), "azimuth_degrees (orbit_camera)");
   }
 }
+
+}  // namespace camera_test

@@ -9,6 +9,8 @@
 #include "scene/gradient_table.hpp"
 #include "support/messages.hpp"
 
+namespace gradient_table_test {
+
 using namespace dpr;
 
 namespace {
@@ -116,3 +118,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace gradient_table_test

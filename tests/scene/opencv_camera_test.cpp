@@ -7,6 +7,8 @@
 
 #include "support/messages.hpp"
 
+namespace opencv_camera_test {
+
 using namespace dpr;
 
 namespace {
@@ -74,3 +76,5 @@ TEST_SUITE("robustness") {
     CHECK(test::contains(message("image_width: w\n" + k_matrix), "camera.yml:1: image_width"));
   }
 }
+
+}  // namespace opencv_camera_test

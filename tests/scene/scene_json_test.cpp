@@ -8,6 +8,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace scene_json_test {
+
 using namespace dpr;
 using dpr::test::TempDir;
 
@@ -397,3 +399,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(scene), "background (scene)");
   }
 }
+
+}  // namespace scene_json_test

@@ -12,6 +12,8 @@
 #include "mesh/mesh_facts.hpp"
 #include "support/messages.hpp"
 
+namespace subdivide_for_lens_test {
+
 using namespace dpr;
 using dpr::check::Random;
 
@@ -396,3 +398,5 @@ TEST_SUITE("gradient") {
     CHECK(pull_back_error(lit) < 1e-3);
   }
 }
+
+}  // namespace subdivide_for_lens_test

@@ -8,6 +8,8 @@
 
 #include "dpr/error.hpp"
 
+namespace adaptive_smoothing_test {
+
 namespace {
 
 dpr::Smoothing sampled_smoothing() {
@@ -143,3 +145,5 @@ TEST_SUITE("robustness") {
                     dpr::InvalidArgument);
   }
 }
+
+}  // namespace adaptive_smoothing_test

@@ -6,6 +6,8 @@
 #include "dpr/annealed_smoothing.hpp"
 #include "dpr/error.hpp"
 
+namespace annealed_smoothing_test {
+
 namespace {
 
 dpr::Smoothing start() {
@@ -72,3 +74,5 @@ TEST_SUITE("robustness") {
     CHECK_THROWS_AS(dpr::AnnealedSmoothing({}, 0, start(), 1e-2), dpr::InvalidArgument);
   }
 }
+
+}  // namespace annealed_smoothing_test

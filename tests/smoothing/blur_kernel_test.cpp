@@ -17,6 +17,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace blur_kernel_test {
+
 namespace {
 
 using dpr::BlurKernel;
@@ -251,3 +253,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace blur_kernel_test

@@ -11,6 +11,8 @@
 #include "smoothing/priors.hpp"
 #include "support/messages.hpp"
 
+namespace smoothing_test {
+
 using namespace dpr;
 
 namespace {
@@ -340,3 +342,5 @@ TEST_SUITE("robustness") {
                           "preset (smoothing): got \"SoftRas\"");
   }
 }
+
+}  // namespace smoothing_test

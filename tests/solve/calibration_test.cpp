@@ -15,6 +15,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace calibration_test {
+
 using namespace dpr;
 using dpr::test::OpencvCase;
 
@@ -321,3 +323,5 @@ TEST_SUITE("pipeline") {
                        double blur) { return opencv_pictures(device, cases, blur); }));
   }
 }
+
+}  // namespace calibration_test

@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+namespace levenberg_marquardt_test {
+
 namespace {
 
 /// H = ((4, 1), (1, 3)), g = (1, 2), S = ((2, 1), (1, 5)).
@@ -49,3 +51,5 @@ TEST_SUITE("unit") {
     CHECK_FALSE(dpr::damped_step(singular, 2, 0.1, step));
   }
 }
+
+}  // namespace levenberg_marquardt_test

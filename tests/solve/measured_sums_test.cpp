@@ -16,6 +16,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace measured_sums_test {
+
 using namespace dpr;
 
 namespace {
@@ -267,3 +269,5 @@ TEST_SUITE("unit") {
     CHECK(*found[2][1] == doctest::Approx(1.4826F * 0.25F).epsilon(1e-3));
   }
 }
+
+}  // namespace measured_sums_test

@@ -16,6 +16,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace normal_equations_test {
+
 using namespace dpr;
 
 namespace {
@@ -369,3 +371,5 @@ TEST_SUITE("pipeline") {
     CHECK(bytes_of(PoseLight::harmonics, 1) < 4000);
   }
 }
+
+}  // namespace normal_equations_test

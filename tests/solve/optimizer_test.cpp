@@ -9,6 +9,8 @@
 
 #include "dpr/error.hpp"
 
+namespace optimizer_test {
+
 namespace {
 
 double step_of(dpr::Optimizer& optimizer, double gradient) {
@@ -92,3 +94,5 @@ TEST_SUITE("robustness") {
     CHECK(step_of(adam, 0.5) == step_of(undisturbed, 0.5));
   }
 }
+
+}  // namespace optimizer_test

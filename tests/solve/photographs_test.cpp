@@ -14,6 +14,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace photographs_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -258,3 +260,5 @@ TEST_SUITE("pipeline") {
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, dpr::find_camera(device, views, 0), "initial");
   }
 }
+
+}  // namespace photographs_test

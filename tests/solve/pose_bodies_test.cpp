@@ -13,6 +13,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace pose_bodies_test {
+
 namespace {
 
 using dpr::test::is_reduced;
@@ -159,3 +161,5 @@ TEST_SUITE("robustness") {
             {.method = method, .meshes = {1}});
   }
 }
+
+}  // namespace pose_bodies_test

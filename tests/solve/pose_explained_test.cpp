@@ -11,6 +11,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace pose_explained_test {
+
 namespace {
 
 using dpr::test::rigid_image;
@@ -74,3 +76,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace pose_explained_test

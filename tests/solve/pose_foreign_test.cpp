@@ -15,6 +15,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace pose_foreign_test {
+
 namespace {
 
 using dpr::test::rigid_image;
@@ -189,3 +191,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace pose_foreign_test

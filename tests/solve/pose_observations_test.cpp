@@ -12,6 +12,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace pose_observations_test {
+
 using namespace dpr;
 
 namespace {
@@ -192,3 +194,5 @@ TEST_SUITE("robustness") {
                           "size of the target (pose)");
   }
 }
+
+}  // namespace pose_observations_test

@@ -13,6 +13,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace pose_places_test {
+
 using namespace dpr;
 
 namespace {
@@ -177,3 +179,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, make({0, 0, 5, 5}), "box (pose): got an orthographic camera");
   }
 }
+
+}  // namespace pose_places_test

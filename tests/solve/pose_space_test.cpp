@@ -9,6 +9,8 @@
 #include "solve/pose_space.hpp"
 #include "support/reduced.hpp"
 
+namespace pose_space_test {
+
 using namespace dpr;
 
 namespace {
@@ -84,3 +86,5 @@ TEST_SUITE("solve") {
     }
   }
 }
+
+}  // namespace pose_space_test

@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
+namespace pose_test {
+
 namespace {
 
 using dpr::test::is_reduced;
@@ -500,3 +502,5 @@ TEST_SUITE("robustness") {
     CHECK_FALSE(solver.solve(solver.scene_pose()).explained);
   }
 }
+
+}  // namespace pose_test

@@ -15,6 +15,8 @@
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 
+namespace pose_tracker_test {
+
 using namespace dpr;
 
 namespace {
@@ -225,3 +227,5 @@ TEST_SUITE("robustness") {
                           "meshes (scene): got none");
   }
 }
+
+}  // namespace pose_tracker_test

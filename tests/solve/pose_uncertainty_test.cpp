@@ -11,6 +11,8 @@
 #include "dpr/renderer.hpp"
 #include "support/reduced.hpp"
 
+namespace pose_uncertainty_test {
+
 namespace {
 
 using dpr::test::is_reduced;
@@ -142,3 +144,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace pose_uncertainty_test

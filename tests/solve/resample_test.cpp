@@ -5,6 +5,8 @@
 
 #include <random>
 
+namespace resample_test {
+
 namespace {
 
 dpr::Image random_image(int width, int height) {
@@ -81,3 +83,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace resample_test

@@ -7,6 +7,8 @@
 
 #include "dpr/pose.hpp"
 
+namespace rigidity_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -89,3 +91,5 @@ TEST_SUITE("unit") {
     CHECK(gradient == std::vector<double>(3, 0));
   }
 }
+
+}  // namespace rigidity_test

@@ -8,6 +8,8 @@
 
 #include "dpr/pose.hpp"
 
+namespace rotation_grid_test {
+
 TEST_SUITE("unit") {
   TEST_CASE("every element is a rotation, and they are as many as asked for") {
     for (const std::size_t count : {0, 1, 2, 100}) {
@@ -41,3 +43,5 @@ TEST_SUITE("unit") {
     CHECK(fine < 0.7 * coarse);  // eight times as many are twice as dense
   }
 }
+
+}  // namespace rotation_grid_test

@@ -8,6 +8,8 @@
 #include "dpr/pose.hpp"
 #include "solve/polar.hpp"
 
+namespace rotation_test {
+
 namespace {
 
 constexpr double k_pi = 3.14159265358979323846;
@@ -94,3 +96,5 @@ TEST_SUITE("unit") {
     CHECK(distance(polar.stretch, glm::dmat3(-2.0)) < 1e-14);
   }
 }
+
+}  // namespace rotation_test

@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
+namespace shape_cameras_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -239,3 +241,5 @@ TEST_SUITE("robustness") {
                           "is damaged");
   }
 }
+
+}  // namespace shape_cameras_test

@@ -10,6 +10,8 @@
 #include "mesh/bounding_box.hpp"
 #include "support/reduced.hpp"
 
+namespace shape_defaults_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -69,3 +71,5 @@ TEST_SUITE("pipeline") {
     CHECK(by_large_reach < 0.5);
   }
 }
+
+}  // namespace shape_defaults_test

@@ -11,6 +11,8 @@
 #include "support/reduced.hpp"
 #include "support/several_devices.hpp"
 
+namespace shape_devices_test {
+
 using namespace dpr;
 using dpr::test::reduced;
 using dpr::test::pipeline::random_image;
@@ -98,3 +100,5 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, ShapeSolver({twice, twice}, views), "devices[1]");
   }
 }
+
+}  // namespace shape_devices_test

@@ -20,6 +20,8 @@
 #include "support/reduced.hpp"
 #include "support/temp_dir.hpp"
 
+namespace shape_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -392,3 +394,5 @@ TEST_SUITE("robustness") {
     CHECK(folder.entries() == 1);
   }
 }
+
+}  // namespace shape_test

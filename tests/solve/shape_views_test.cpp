@@ -8,6 +8,8 @@
 #include "support/messages.hpp"
 #include "support/temp_dir.hpp"
 
+namespace shape_views_test {
+
 namespace {
 
 using dpr::Image;
@@ -129,3 +131,5 @@ TEST_SUITE("unit") {
                           "smoothing.sigma" + of_file);
   }
 }
+
+}  // namespace shape_views_test

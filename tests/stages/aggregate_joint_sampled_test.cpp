@@ -10,6 +10,8 @@
 #include "support/estimates.hpp"
 #include "support/synthetic_pixels.hpp"
 
+namespace aggregate_joint_sampled_test {
+
 namespace {
 
 namespace ref = dpr::reference;
@@ -265,3 +267,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace aggregate_joint_sampled_test

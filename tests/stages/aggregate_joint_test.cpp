@@ -8,6 +8,8 @@
 
 #include "support/aggregate_errors.hpp"
 
+namespace aggregate_joint_test {
+
 namespace {
 
 using dpr::Prior;
@@ -211,3 +213,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace aggregate_joint_test

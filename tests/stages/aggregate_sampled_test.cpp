@@ -11,6 +11,8 @@
 #include "support/estimates.hpp"
 #include "support/synthetic_pixels.hpp"
 
+namespace aggregate_sampled_test {
+
 namespace {
 
 namespace ref = dpr::reference;
@@ -256,3 +258,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace aggregate_sampled_test

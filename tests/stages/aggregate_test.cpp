@@ -6,6 +6,8 @@
 
 #include "support/aggregate_errors.hpp"
 
+namespace aggregate_test {
+
 namespace {
 
 using dpr::Prior;
@@ -197,3 +199,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace aggregate_test

@@ -11,6 +11,8 @@
 #include "support/contour_frame.hpp"
 #include "support/reduced.hpp"
 
+namespace antialias_test {
+
 using namespace dpr;
 using dpr::test::ContourFrame;
 using dpr::test::device_impl;
@@ -429,3 +431,5 @@ TEST_SUITE("gradient") {
     CHECK(std::sqrt(error / size2) < 1e-3);
   }
 }
+
+}  // namespace antialias_test

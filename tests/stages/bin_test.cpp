@@ -10,6 +10,8 @@
 #include "support/reduced.hpp"
 #include "support/variable.hpp"
 
+namespace bin_test {
+
 namespace {
 
 using dpr::test::NdcFrame;
@@ -250,3 +252,5 @@ TEST_SUITE("unit") {
     CHECK(starts == std::vector<cl_uint>(s.params.tiles_x * s.params.tiles_y + 1, 0));
   }
 }
+
+}  // namespace bin_test

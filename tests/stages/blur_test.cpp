@@ -16,6 +16,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace blur_test {
+
 namespace {
 
 using dpr::Blur;
@@ -422,3 +424,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace blur_test

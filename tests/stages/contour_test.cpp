@@ -11,6 +11,8 @@
 #include "support/contour_frame.hpp"
 #include "support/reduced.hpp"
 
+namespace contour_test {
+
 using namespace dpr;
 using dpr::test::ContourFrame;
 using dpr::test::ends_of;
@@ -244,3 +246,5 @@ TEST_SUITE("unit") {
     CHECK(frame.contour.tile_starts.download().back() == pairs);
   }
 }
+
+}  // namespace contour_test

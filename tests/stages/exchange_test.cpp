@@ -9,6 +9,8 @@
 #include "pipeline/scenes.hpp"
 #include "stages/exchange.hpp"
 
+namespace exchange_test {
+
 using namespace dpr;
 using dpr::test::pipeline::Random;
 
@@ -126,3 +128,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace exchange_test

@@ -17,6 +17,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace image_loss_test {
+
 namespace {
 
 constexpr std::size_t k_views = 3;
@@ -230,3 +232,5 @@ TEST_SUITE("robustness") {
                     dpr::InvalidArgument);
   }
 }
+
+}  // namespace image_loss_test

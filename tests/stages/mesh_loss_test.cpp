@@ -21,6 +21,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace mesh_loss_test {
+
 namespace {
 
 using dpr::Mesh;
@@ -202,3 +204,5 @@ TEST_SUITE("robustness") {
     }
   }
 }
+
+}  // namespace mesh_loss_test

@@ -11,6 +11,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace noise_test {
+
 namespace {
 
 using dpr::test::device_impl;
@@ -173,3 +175,5 @@ TEST_SUITE("statistical") {
     CHECK(std::abs(squares / n - 1.0 / 3) < 4 * std::sqrt(4.0 / 45 / n));
   }
 }
+
+}  // namespace noise_test

@@ -12,6 +12,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace occupancy_sampled_test {
+
 namespace {
 
 namespace ref = dpr::reference;
@@ -261,3 +263,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace occupancy_sampled_test

@@ -12,6 +12,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace ownership_test {
+
 using dpr::test::FoundFragments;
 using dpr::test::GridPoint;
 using dpr::test::GridTriangle;
@@ -313,3 +315,5 @@ TEST_SUITE("unit") {
     });
   }
 }
+
+}  // namespace ownership_test

@@ -13,6 +13,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace philox_test {
+
 namespace {
 
 using dpr::Buffer;
@@ -222,3 +224,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace philox_test

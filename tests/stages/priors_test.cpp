@@ -13,6 +13,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace priors_test {
+
 namespace {
 
 using dpr::Buffer;
@@ -373,3 +375,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace priors_test

@@ -14,6 +14,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace rasterize_test {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -439,3 +441,5 @@ TEST_SUITE("gradient") {
     }
   }
 }
+
+}  // namespace rasterize_test

@@ -11,6 +11,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace runs_test {
+
 using namespace dpr;
 using dpr::test::reduced;
 
@@ -74,3 +76,5 @@ TEST_SUITE("unit") {
       CHECK(colors[k] * static_cast<double>(color[k]) == doctest::Approx(expected[k]).epsilon(3e-5));
   }
 }
+
+}  // namespace runs_test

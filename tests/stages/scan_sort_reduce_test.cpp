@@ -14,6 +14,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace scan_sort_reduce_test {
+
 namespace {
 
 using dpr::Buffer;
@@ -306,3 +308,5 @@ TEST_SUITE("unit") {
     CHECK(std::isnan(operation.read({{values.size(), 1, 1, 1, on_device(r.starts), poisoned}})[0][0]));
   }
 }
+
+}  // namespace scan_sort_reduce_test

@@ -13,6 +13,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace shade_test {
+
 namespace {
 
 namespace ref = dpr::reference;
@@ -367,3 +369,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace shade_test

@@ -13,6 +13,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace ssim_test {
+
 using namespace dpr;
 
 namespace {
@@ -163,3 +165,5 @@ TEST_SUITE("robustness") {
     CHECK(LossWeights::only(LossKind::ssim).ssim == 1);
   }
 }
+
+}  // namespace ssim_test

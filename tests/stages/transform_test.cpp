@@ -14,6 +14,8 @@
 #include "support/reduced.hpp"
 #include "support/worst.hpp"
 
+namespace transform_test {
+
 namespace {
 
 namespace ref = dpr::reference;
@@ -311,3 +313,5 @@ TEST_SUITE("gradient") {
     for (const cl_float4& g : grad.download()) CHECK(g.s[0] == 0.0F);
   }
 }
+
+}  // namespace transform_test
