@@ -173,8 +173,7 @@ TEST_SUITE("pipeline") {
     scene.camera.fov_y_degrees = 90;
     scene.camera.znear = 0.5F;
     scene.camera.distortion = dpr::Distortion{-0.3F, 0.05F};
-    const dpr::Image target =
-        rigid_image(device, dpr::subdivide_for_lens(scene, {.tolerance = 0.02F}).scene);
+    const dpr::Image target = rigid_image(device, dpr::subdivide_for_lens(scene, {.tolerance = 0.02F}).scene);
     const dpr::Pose start{turned(3).rotation, {0.03, 0.02, -0.03}};
     dpr::LeastSquares method = least_squares();
     method.rotations = 0;
