@@ -25,6 +25,16 @@ static inline Level find_level(const Texture t, uint level) {
   return l;
 }
 
+/// The level of a pyramid's texel `i`, counted through all levels; `i` becomes its number in the level.
+static inline Level level_of(const Texture t, uint* i) {
+  Level l = find_level(t, 0);
+  while (*i >= l.width * l.height) {
+    *i -= l.width * l.height;
+    l = next_level(l);
+  }
+  return l;
+}
+
 /// The part of texel `small` of `count` that texel `large` of `large_count` covers, along one axis.
 static inline float covered_part(uint small, uint count, uint large, uint large_count) {
   // In units of 1 / (count * large_count) of the side, which are whole.

@@ -25,6 +25,12 @@
 #define DPR_RUN_CHUNK 512
 #define DPR_RUN_SLOTS(count) (2 * ((count) / DPR_RUN_CHUNK + 1))
 
+/// Sums over the fragments of a texel on GPUs (texels.cl). Fragments of a tile in a cell beyond which they have
+/// their sum in a table, those beyond which a texel is a whole group's, and sorted places that a group looks at.
+#define DPR_TEXEL_RUN 4
+#define DPR_SHARED_TEXEL 128
+#define DPR_TEXEL_BLOCK 256
+
 /// Bits by which a pass of a sort orders, at most.
 #define DPR_SORT_BITS 8
 

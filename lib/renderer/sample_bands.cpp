@@ -42,7 +42,9 @@ Range window_around(const shared::FrameParams& p, const Range& rows, std::size_t
 /// Device memory of a fragment: its share of what a band's stages hold, forward and backward.
 std::size_t Renderer::Impl::fragment_bytes() const {
   constexpr std::size_t k_always = Rasterize::k_fragment_bytes + Aggregate::k_fragment_bytes;
-  return k_always + (geometry->textures.empty() ? 0 : Rasterize::k_base_bytes + Surface::k_fragment_bytes);
+  if (geometry->textures.empty()) return k_always;
+  return k_always + Rasterize::k_base_bytes + Surface::k_fragment_bytes +
+         Texels::fragment_bytes(impl_of(device));
 }
 
 /// Memory for fragments: no more of them than kernels can index.

@@ -1,6 +1,8 @@
 // The smaller levels of textures; and gradients of texels, gathered from what fragments see of them.
 #pragma once
 
+#include <optional>
+
 #include "kernels/texels.hpp"
 #include "stages/geometry.hpp"
 #include "stages/sort.hpp"
@@ -10,7 +12,7 @@ namespace dpr {
 
 class Texels {
  public:
-  explicit Texels(Device::Impl& device) : device_(device), sort_(device), launch_(device) {}
+  explicit Texels(Device::Impl& device);
 
   /// Fills the smaller levels from the largest.
   void build(Textures& textures);
@@ -24,12 +26,20 @@ class Texels {
   Buffer<cl_float4> grad;  ///< [texel]; those of the largest levels are the textures' own
 
   std::size_t bytes() const;
+  /// Bytes a fragment of the buffers below, of two levels.
+  static std::size_t fragment_bytes(const Device::Impl& device);
 
  private:
+  /// Fills the tables of sums by tile, and empties the list of texels that groups add up.
+  void find_runs(const Textures& textures, const Surface& surface);
+
   Device::Impl& device_;
   Sort sort_;
   Launcher<kernel::texels_sum, kernel::texels_shrink, kernel::texels_shrink_backward> launch_;
+  std::optional<Launcher<kernel::texels_runs, kernel::texels_sum_shared>> share_;  // on GPUs
   Buffer<cl_uint> starts_;  // [texel + 2] runs of fragments by cell; the last cell is that of no texture
+  Buffer<cl_uint> tiles_, shared_;  // on GPUs: [place] in order of cells; texels that groups add up
+  Buffer<cl_float4> sums_;          // on GPUs: [place / DPR_TEXEL_RUN][4]
 };
 
 }  // namespace dpr
