@@ -80,7 +80,7 @@ void add_band(Device::Impl& device, Texels& texels, const Textures& textures, co
   texels.add(textures, surface);
 }
 
-/// A texel's gradient, and the sum of the magnitudes that it is made of.
+/// A texel's gradient, and the sum of the magnitudes of the gradients that it has parts of.
 struct Expected {
   std::array<double, 3> sum{}, magnitude{};
 };
@@ -103,7 +103,7 @@ std::vector<Expected> expected_of(const Textures& textures, const Places& places
       const std::array<float, 3> grad{seen.red, seen.green, seen.blue};
       for (std::size_t c = 0; c < 3; ++c) {
         texel.sum[c] += part * double{grad[c]};
-        texel.magnitude[c] += std::abs(part * double{grad[c]});
+        texel.magnitude[c] += std::abs(double{grad[c]});
       }
     }
   }
