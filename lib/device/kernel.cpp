@@ -30,6 +30,16 @@ std::string build_options(const Device::Impl& device, const std::string& more) {
   return options_of(device, more, device.group_size);
 }
 
+bool rounds_divisions(const Device::Impl& device) {
+  const auto config =
+      cl_info<CL_DEVICE_SINGLE_FP_CONFIG>(device.device, "clGetDeviceInfo CL_DEVICE_SINGLE_FP_CONFIG");
+  return (config & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0;
+}
+
+std::string division_option(const Device::Impl& device) {
+  return device.info.lanes == 1 && rounds_divisions(device) ? " -cl-fp32-correctly-rounded-divide-sqrt" : "";
+}
+
 namespace detail {
 namespace {
 

@@ -65,6 +65,12 @@ struct KernelSource {
 /// The options every kernel of a device is built with.
 std::string build_options(const Device::Impl& device, const std::string& more = "");
 
+/// True if the device rounds divisions and roots in single precision correctly where it is asked to. OpenCL allows an
+/// error of 2.5 ulp where it is not.
+bool rounds_divisions(const Device::Impl& device);
+/// The option that asks a GPU for that; empty where it cannot. CPUs divide by an instruction that rounds correctly.
+std::string division_option(const Device::Impl& device);
+
 /// Work-items [first, first + count) of a launch; a count alone starts at 0.
 struct Range {
   Range(std::size_t count_) : count(count_) {}

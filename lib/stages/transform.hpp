@@ -17,7 +17,8 @@ struct DeviceViews {
 
 class Transform {
  public:
-  explicit Transform(Device::Impl& device) : device_(device), launch_(device) {}
+  /// Projected vertices are rounded correctly where the device can: a vertex that is seen at a sample's centre lies there.
+  explicit Transform(Device::Impl& device) : device_(device), launch_(device, division_option(device)) {}
 
   /// Makes room for the normals that shading finds, if it is to.
   void forward(const shared::FrameParams& p, const DeviceViews& views, const Geometry& geometry,

@@ -44,7 +44,7 @@ def option_sets(kernels):
             "aggregate_sampled.cl": [[prior] for prior in of_sampled], "aggregate_joint_sampled.cl": joint,
             "normal_equations.cl": fits + measured, "normal_measured.cl": measured, "occupancy.cl": [list(pair) for pair in itertools.product(of_exact, WIDTHS)],
             "occupancy_sampled.cl": [list(pair) for pair in itertools.product(of_sampled, WIDTHS)], "shade_lit.cl": SHADING,
-            "shade_lit_tangent.cl": SHADING}
+            "shade_lit_tangent.cl": SHADING, "transform.cl": [[], ["-cl-fp32-correctly-rounded-divide-sqrt"]]}
 
 
 def compilations(folders, lanes):

@@ -115,27 +115,29 @@ Comparison compare(const Image& found, const std::vector<ZPixel>& expected) {
 }
 
 /// A scene whose projection is exact, with its triangles on the image's grid. Depths are eighths between 2
-/// and 8.
+/// and 8. The camera is orthographic for devices that may not divide exactly.
 struct GridScene {
   Scene scene;
   std::vector<GridTriangle> triangles;
 };
 
-GridScene grid_scene(const std::vector<GridPoint>& points, const std::vector<glm::uvec3>& faces, int size,
-                     Random& random) {
+GridScene grid_scene(const Device& device, const std::vector<GridPoint>& points,
+                     const std::vector<glm::uvec3>& faces, int size, Random& random) {
+  const bool divides = rounds_divisions(impl_of(device));
   GridScene result;
   Scene& scene = result.scene;
   scene.width = scene.height = size;
   scene.camera.view = glm::mat4(1.0F);
   scene.camera.fov_y_degrees = 90;
+  if (!divides) scene.camera.orthographic_height = 2.0F;
   scene.smoothing = smoothing_preset("rigid");
   Mesh mesh;
   mesh.faces = faces;
   const float unit = 2.0F / static_cast<float>(dpr::test::k_subpixels * size);
   for (const GridPoint& p : points) {
     const float depth = std::round(random(16, 64)) / 8;
-    mesh.positions.emplace_back(static_cast<float>(p.x) * unit * depth,
-                                static_cast<float>(p.y) * unit * depth, -depth);
+    const float scale = divides ? unit * depth : unit;
+    mesh.positions.emplace_back(static_cast<float>(p.x) * scale, static_cast<float>(p.y) * scale, -depth);
   }
   scene.meshes.push_back({std::move(mesh), glm::mat4(1.0F)});
   for (const glm::uvec3& f : faces) result.triangles.push_back({points[f.x], points[f.y], points[f.z]});
@@ -261,7 +263,8 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("rigid: no crack along a diagonal, in a grid aligned with the pixels, nor in a frontal cube") {
     const int size = reduced(256, 32);
-    Renderer renderer(open_device());
+    const Device device = open_device();
+    Renderer renderer(device);
     Random random(40);
     // Vertices at the samples, or at the pixels' corners.
     for (const int shift : {0, 8}) {
@@ -279,7 +282,7 @@ TEST_SUITE("pipeline") {
           faces.insert(faces.end(), {{a, a + 1, a + side + 1}, {a, a + side + 1, a + side}});
         }
       }
-      const Coverage grid = compare_coverage(renderer, grid_scene(points, faces, size, random));
+      const Coverage grid = compare_coverage(renderer, grid_scene(device, points, faces, size, random));
       CHECK(grid.differing == 0);
       CHECK(grid.owned == static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
       CHECK(grid.owned == grid.owned_once);
@@ -287,7 +290,7 @@ TEST_SUITE("pipeline") {
     const std::int64_t half = 8 * size / 2;
     const std::vector<GridPoint> corners{{-half, -half}, {half, -half}, {half, half}, {-half, half}};
     const Coverage quad =
-        compare_coverage(renderer, grid_scene(corners, {{0, 1, 2}, {0, 2, 3}}, size, random));
+        compare_coverage(renderer, grid_scene(device, corners, {{0, 1, 2}, {0, 2, 3}}, size, random));
     CHECK(quad.differing == 0);
     CHECK(quad.owned == static_cast<std::size_t>(size) * static_cast<std::size_t>(size) / 4);
 
@@ -319,7 +322,8 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("rigid: closed meshes on the pixel grid cover what an integer rasterizer says") {
     const int size = 64, renders = reduced(1000, 3);
-    Renderer renderer(open_device());
+    const Device device = open_device();
+    Renderer renderer(device);
     Random random(41);
     const std::array<Mesh, 4> shapes{make_icosphere(2), make_cube(), make_torus(0.8F, 0.4F, 20, 12),
                                      bumpy(make_icosphere(3), random)};
@@ -336,7 +340,8 @@ TEST_SUITE("pipeline") {
         };
         points.push_back({snapped(p.x), snapped(p.y)});
       }
-      const Coverage found = compare_coverage(renderer, grid_scene(points, shape.faces, size, random));
+      const Coverage found =
+          compare_coverage(renderer, grid_scene(device, points, shape.faces, size, random));
       all.differing += found.differing;
       all.unbalanced += found.unbalanced;
       all.owned += found.owned;
