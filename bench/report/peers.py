@@ -219,12 +219,15 @@ class DprBench:
     def __init__(self, name):
         self.name = name
 
-    def turn(self, steps):
+    def results(self, steps):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "row.json")
             subprocess.run(["dpr-bench", "--workload", self.name, "--preset", "pixel-sharp", "--stage", "rasterize",
                             "--repetitions", str(steps), "-o", file, "--quiet"], check=True)
-            row = json.loads(file.read_text())["results"][0]
+            return json.loads(file.read_text())
+
+    def turn(self, steps):
+        row = self.results(steps)["results"][0]
         return list(zip(row["forward_ms"]["runs"], row["backward_ms"]["runs"]))
 
 
@@ -305,6 +308,16 @@ def measure(programs, python, workloads, rounds):
     return rows
 
 
+def machine_of(programs):
+    """The processor, and the OpenCL device on which dpr runs here, if it is one of the programs."""
+    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if "model name" in line),
+                     platform.processor())
+    machine = f"{processor}, {os.cpu_count()} cores"
+    if not any(PROGRAMS[program][1] == "dpr" for program in programs):
+        return machine
+    return f"{machine}; dpr on {DprBench('cube128').results(1)['device']['name']}"
+
+
 def rows_of(results):
     return list(csv.DictReader(line for line in results.read_text().splitlines() if not line.startswith("#")))
 
@@ -350,8 +363,6 @@ def main():
     rows = measure([p for p in versions if versions[p]], options.python, options.workloads or list(WORKLOADS),
                    options.rounds)
     if options.output:
-        processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if "model name" in line),
-                         platform.processor())
         columns = "program,version,workload,forward_ms,backward_ms,step_ms,median_ms,steps,date,load"
         made = f"{datetime.date.today()},{os.getloadavg()[0]:.1f}"
         lines = [f"{program},{versions[program]},{name},{','.join(f'{ms:.4g}' for ms in times)},{steps},{made}"
@@ -362,9 +373,9 @@ def main():
                       if (row["program"], row["workload"]) not in measured]
         place = {(program, name): (i, k) for i, name in enumerate(WORKLOADS) for k, program in enumerate(PROGRAMS)}
         lines.sort(key=lambda line: place[line.split(",")[0], line.split(",")[2]])
-        machine = (f"# {processor}, {os.cpu_count()} cores. The fastest of the steps, between which the other programs took "
-                   "their turns, and the median.")
-        options.output.write_text("\n".join([machine, columns, *lines]) + "\n")
+        head = (f"# {machine_of({line.split(',')[0] for line in lines})}. The fastest of the steps, between which the other programs took "
+                "their turns, and the median.")
+        options.output.write_text("\n".join([head, columns, *lines]) + "\n")
 
 
 if __name__ == "__main__":
