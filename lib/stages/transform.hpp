@@ -17,7 +17,7 @@ struct DeviceViews {
 
 class Transform {
  public:
-  /// Projected vertices are rounded correctly where the device can: a vertex that is seen at a sample's centre lies there.
+  /// Projections are rounded correctly where the device can: a vertex that is seen at a sample's centre lies there.
   explicit Transform(Device::Impl& device) : device_(device), launch_(device, division_option(device)) {}
 
   /// Makes room for the normals that shading finds, if it is to.
