@@ -12,6 +12,8 @@
 #include "support/probe.hpp"
 #include "support/reduced.hpp"
 
+namespace texels_test {
+
 using namespace dpr;
 
 namespace {
@@ -161,3 +163,5 @@ TEST_SUITE("unit") {
     }
   }
 }
+
+}  // namespace texels_test
