@@ -1,9 +1,12 @@
 // Helpers that the checks of the scene's parts share: a value's text in messages, and common conditions.
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
 #include <string>
@@ -30,6 +33,27 @@ inline std::string text(const glm::vec3& v) {
 
 inline bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Place of the first number that is not finite; as many as there are where all are. Blocks are compared without a branch.
+inline std::size_t first_not_finite(std::span<const float> numbers) {
+  constexpr std::size_t k_block = 1024;
+  constexpr std::uint32_t k_exponent = 0x7f800000;
+  const auto is_bad = [](float x) { return (std::bit_cast<std::uint32_t>(x) & k_exponent) == k_exponent; };
+  for (std::size_t first = 0; first < numbers.size(); first += k_block) {
+    const std::span<const float> block = numbers.subspan(first, std::min(k_block, numbers.size() - first));
+    std::uint32_t bad = 0;
+    for (const float x : block) bad |= is_bad(x) ? 1U : 0U;
+    if (bad != 0)
+      return first + static_cast<std::size_t>(std::ranges::find_if(block, is_bad) - block.begin());
+  }
+  return numbers.size();
+}
+
+/// The numbers of vectors of floats.
+template <class Vector>
+std::span<const float> floats_of(std::span<const Vector> vectors) {
+  return {reinterpret_cast<const float*>(vectors.data()), vectors.size() * (sizeof(Vector) / sizeof(float))};
 }
 
 /// "640x480"
@@ -102,10 +126,9 @@ inline void require_affine(const glm::mat4& matrix, const std::string& argument)
 }
 
 inline void require_finite(std::span<const glm::vec4> pixels, const std::string& argument) {
-  for (const glm::vec4& p : pixels) {
-    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z) && std::isfinite(p.w)) continue;
-    throw InvalidArgument(argument, "a pixel that is not finite", "finite values");
-  }
+  const std::span<const float> numbers = floats_of(pixels);
+  if (first_not_finite(numbers) == numbers.size()) return;
+  throw InvalidArgument(argument, "a pixel that is not finite", "finite values");
 }
 
 /// Throws unless the image has the pixels its size asks for, all finite.

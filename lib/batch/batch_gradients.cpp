@@ -1,11 +1,13 @@
 // Gradients of a batch's arrays from those of the renderer, and the renderer's directions from the arrays'.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "base/checks.hpp"
 #include "batch/batch.hpp"
 #include "batch/inputs.hpp"
 #include "dpr/error.hpp"
@@ -151,7 +153,15 @@ void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray&
         is_affine ? affine_gradients(views, vertices_, positions) : rigid_gradients(views, found), add);
   }
   for_each_array_of(gradient.name, found, [&](const GradientRow& row, GradientIndex i, GradientArray array) {
-    if (exists(row, i, renderer.scene(), views)) transform_numbers(array, add);
+    if (!exists(row, i, renderer.scene(), views)) return;
+    const auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array);
+    if (vectors && next == 0 && sums.size() == 3 * (*vectors)->size()) {  // millions, perhaps
+      const std::span<const float> floats = checks::floats_of(std::span<const glm::vec3>(**vectors));
+      std::ranges::transform(sums, floats, sums.begin(), std::plus());
+      count += floats.size();
+    } else {
+      transform_numbers(array, add);
+    }
   });
   // Vertices that the views share have the sum over the views.
   if (count != 0 && count != sums.size() &&

@@ -107,6 +107,19 @@ struct Device::Impl {
   std::list<PendingWrite> writes_;
 };
 
+/// A write that reads the caller's memory, not a copy, and waits for that as it is destroyed.
+class LentWrite {
+ public:
+  LentWrite(Device::Impl& device, const cl::Buffer& buffer, std::span<const std::byte> bytes);
+  ~LentWrite();
+  LentWrite(const LentWrite&) = delete;
+  LentWrite& operator=(const LentWrite&) = delete;
+
+ private:
+  Device::Impl& device_;
+  cl::Event run_;
+};
+
 /// Reads that the host waits for together. Not thread-safe.
 class PendingReads {
  public:

@@ -41,6 +41,17 @@ void Device::Impl::read(const cl::Buffer& buffer, std::size_t first, std::span<s
   std::erase_if(writes_, [](const PendingWrite& write) { return write.has_run(); });
 }
 
+LentWrite::LentWrite(Device::Impl& device, const cl::Buffer& buffer, std::span<const std::byte> bytes)
+    : device_(device) {
+  check_cl(device.queue.enqueueWriteBuffer(buffer, CL_FALSE, 0, bytes.size(), bytes.data(), nullptr, &run_),
+           "clEnqueueWriteBuffer");
+  device.bytes_to_device += bytes.size();
+}
+
+LentWrite::~LentWrite() {
+  if (run_.wait() != CL_SUCCESS) device_.queue.finish();
+}
+
 PendingReads::~PendingReads() {
   if (is_pending_ && last_.wait() != CL_SUCCESS) device_.queue.finish();  // they write to the host's memory
 }

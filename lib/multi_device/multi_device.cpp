@@ -60,6 +60,7 @@ void MultiDeviceRenderer::set_array(const ArrayRef& array, const ArrayValues& va
   Impl& m = *impl_;
   m.require_views(("MultiDeviceRenderer::" + setter_of(array)).c_str());
   const HostArray held = require_array(m.scene, array, values);
+  check_values(row_of(array.id).name, values);
   std::uint64_t& version = m.now.arrays[array];
   assign(held, values);
   ++version;

@@ -17,14 +17,12 @@ void BackFaces::forget(std::size_t mesh) noexcept {
 void BackFaces::measure(State& state, const Mesh& mesh) {
   state.is_measured = true;
   state.winding = state.solid.winding(mesh.positions, mesh.faces);
-  if (state.winding != 0) state.box = box_corners(mesh.positions);
 }
 
-float BackFaces::hidden_of(const State& state, const Camera& camera, const glm::mat4& model,
+float BackFaces::hidden_of(int winding, const BoxCorners& box, const Camera& camera, const glm::mat4& model,
                            float depth_reach) {
   constexpr double k_least_thickness = 10;  // of the noise's reach
-  if (state.winding == 0) return 0;
-  const DepthRange range = depth_range(state.box, camera, model);
+  const DepthRange range = depth_range(box, camera, model);
   const double thickness = (range.furthest - range.nearest) /
                            (static_cast<double>(camera.zfar) - static_cast<double>(camera.znear));
   if (!is_beyond_near_plane(range, camera) ||
@@ -32,18 +30,22 @@ float BackFaces::hidden_of(const State& state, const Camera& camera, const glm::
     return 0;
   const double determinant = glm::determinant(glm::dmat3(glm::dmat4(camera.view) * glm::dmat4(model)));
   if (determinant == 0) return 0;
-  return determinant * state.winding > 0 ? -1.0F : 1.0F;
+  return determinant * winding > 0 ? -1.0F : 1.0F;
 }
 
-std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, float depth_reach) {
+std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
+                                     float depth_reach) {
   for (std::size_t m = 0; m < states_.size(); ++m) {
     if (!states_[m].is_measured && !scene.meshes[m].instance_of) measure(states_[m], scene.meshes[m].mesh);
   }
   std::vector<float> hidden;
-  for (const View& view : views) {
-    for (std::size_t m = 0; m < states_.size(); ++m)
-      hidden.push_back(hidden_of(states_[scene.meshes[m].instance_of.value_or(m)], view.camera,
-                                 view.transforms[m], depth_reach));
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::size_t m = 0; m < states_.size(); ++m) {
+      const int winding = states_[scene.meshes[m].instance_of.value_or(m)].winding;
+      hidden.push_back(winding == 0 ? 0.0F
+                                    : hidden_of(winding, near_plane.box_of(scene, v, m), views[v].camera,
+                                                views[v].transforms[m], depth_reach));
+    }
   }
   return hidden;
 }

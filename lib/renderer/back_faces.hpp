@@ -6,7 +6,7 @@
 
 #include "dpr/renderer.hpp"
 #include "mesh/solid.hpp"
-#include "renderer/depth_range.hpp"
+#include "renderer/near_plane.hpp"
 
 namespace dpr {
 
@@ -25,17 +25,18 @@ class BackFaces {
   /// where the mesh bounds a solid that lies wholly behind the near plane, thicker by far than the depth
   /// (normalised) by which the noise of the depths shows what lies behind. Where a mesh passes through itself
   /// such that its inside is outside, its far side is seen there. O(faces of meshes moved + views * meshes).
-  std::vector<float> hidden(const Scene& scene, std::span<const View> views, float depth_reach);
+  std::vector<float> hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
+                            float depth_reach);
 
  private:
   struct State {
     Solid solid;
     bool is_measured = false;
     int winding = 0;
-    BoxCorners box{};  // object space
   };
   static void measure(State& state, const Mesh& mesh);
-  static float hidden_of(const State& state, const Camera& camera, const glm::mat4& model, float depth_reach);
+  static float hidden_of(int winding, const BoxCorners& box, const Camera& camera, const glm::mat4& model,
+                         float depth_reach);
 
   std::vector<State> states_;  // [mesh]; not of instances, which have their mesh's
 };

@@ -7,8 +7,9 @@
 
 namespace dpr {
 
-BoxCorners box_corners(std::span<const glm::vec3> points) {
-  const Bounds box = bounding_box(points);
+BoxCorners box_corners(std::span<const glm::vec3> points) { return box_corners(bounding_box(points)); }
+
+BoxCorners box_corners(const Bounds& box) {
   BoxCorners corners;
   for (unsigned corner = 0; corner < corners.size(); ++corner) {
     corners[corner] = {(corner & 1U) != 0 ? box.high.x : box.low.x,

@@ -7,12 +7,14 @@
 #include <span>
 
 #include "dpr/camera.hpp"
+#include "dpr/voxels.hpp"
 
 namespace dpr {
 
 /// The corners of the box around points, of which there must be some.
 using BoxCorners = std::array<glm::dvec3, 8>;
 BoxCorners box_corners(std::span<const glm::vec3> points);
+BoxCorners box_corners(const Bounds& box);
 
 /// Depths between which all that lies in a box has its own, but for rounding.
 struct DepthRange {

@@ -178,7 +178,7 @@ HostArray require_array(Scene& scene, const ArrayRef& at, const ArrayValues& val
   const MeshArray& row = row_of(at.id);
   if (array.index() != values.index())
     throw InvalidArgument(row.name, "elements of another type", "the type that Mesh holds");
-  check_values(row.name, values, count_of(array));
+  require_count(row.name, values, count_of(array));
   return array;
 }
 
@@ -197,19 +197,22 @@ void assign(const HostArray& array, const ArrayValues& values) {
   std::visit(copy, values);
 }
 
-void check_values(const char* name, const ArrayValues& values, std::size_t expected) {
+void require_count(const char* name, const ArrayValues& values, std::size_t expected) {
   const auto check = [&]<class Element>(std::span<const Element> list) {
+    if (list.size() == expected) return;
     constexpr bool is_vector = !std::is_same_v<Element, Material>;
-    if (list.size() != expected) {
-      throw InvalidArgument(name, std::to_string(list.size()) + (is_vector ? " vectors" : ""),
-                            std::to_string(expected));
-    }
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      if constexpr (!is_vector) {
-        validate(list[i], checks::element(name, i));
-      } else if (const glm::vec3 v = to_vec3(list[i]); !checks::is_finite(v)) {
-        checks::require_finite(v, checks::element(name, i));
-      }
+    throw InvalidArgument(name, std::to_string(list.size()) + (is_vector ? " vectors" : ""),
+                          std::to_string(expected));
+  };
+  std::visit(check, values);
+}
+
+void check_values(const char* name, const ArrayValues& values) {
+  const auto check = [&]<class Element>(std::span<const Element> list) {
+    if constexpr (std::is_same_v<Element, Material>) {
+      for (std::size_t i = 0; i < list.size(); ++i) validate(list[i], checks::element(name, i));
+    } else {
+      require_finite(name, list, 0);
     }
   };
   std::visit(check, values);
@@ -218,7 +221,7 @@ void check_values(const char* name, const ArrayValues& values, std::size_t expec
 void Renderer::set_array(const ArrayRef& array, const ArrayValues& values) {
   impl_->require_scene(("Renderer::" + setter_of(array)).c_str());
   require_array(impl_->scene, array, values);
-  impl_->set(array, values);
+  impl_->set(array, values);  // checks the values as it copies them
 }
 
 void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values, const Events& events) {

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "base/checks.hpp"
 #include "device/buffer.hpp"
 #include "dpr/opencl_handles.hpp"
 #include "dpr/renderer.hpp"
@@ -54,14 +55,24 @@ ArrayId id_of(bool GradientRequest::*wanted);
 /// The scene's array. Throws InvalidArgument for a mesh or texture that is not there, an instance of another
 /// mesh, and a mesh that lacks an array which may not be empty.
 HostArray require_array(Scene& scene, const ArrayRef& at);
-/// The same, which the values can replace: throws InvalidArgument for those of another type, too.
+/// The same, which the values can replace: throws InvalidArgument for those of another type or number, too.
 HostArray require_array(Scene& scene, const ArrayRef& at, const ArrayValues& values);
 std::size_t count_of(const HostArray& array);
 ArrayValues values_of(const HostArray& array);
 /// Copies as many elements as the array has.
 void assign(const HostArray& array, const ArrayValues& values);
 
-/// Throws InvalidArgument unless there are as many values as expected, all valid; `name` says of what.
-void check_values(const char* name, const ArrayValues& values, std::size_t expected);
+/// Throws InvalidArgument unless there are as many values as expected; `name` says of what.
+void require_count(const char* name, const ArrayValues& values, std::size_t expected);
+/// Throws InvalidArgument unless all values are valid.
+void check_values(const char* name, const ArrayValues& values);
+/// The same of vectors, of which the first is element `first`.
+template <class Vector>
+void require_finite(const char* name, std::span<const Vector> vectors, std::size_t first) {
+  const std::span<const float> numbers = checks::floats_of(vectors);
+  const std::size_t place = checks::first_not_finite(numbers) / static_cast<std::size_t>(Vector::length());
+  if (place < vectors.size())
+    checks::require_finite(to_vec3(vectors[place]), checks::element(name, first + place));
+}
 
 }  // namespace dpr

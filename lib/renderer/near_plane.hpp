@@ -21,6 +21,8 @@ class NearPlane {
     boxes_[mesh].reset();
     is_known_[mesh] = true;
   }
+  /// The box around the mesh's positions; none: measured when it is first wanted.
+  void set_box(std::size_t mesh, const BoxCorners& box) noexcept { boxes_[mesh] = box; }
   /// Only the device knows the mesh's positions; those of views with shapes of their own.
   void forget(std::size_t mesh) noexcept { is_known_[mesh] = false; }
   void forget_views() noexcept { are_views_known_ = false; }
@@ -38,10 +40,10 @@ class NearPlane {
   /// False only if every vertex is known to lie beyond the near plane. O(vertices of meshes moved + views *
   /// meshes).
   bool may_be_crossed(const Scene& scene, std::span<const View> views);
-
- private:
+  /// The box around a mesh of a view. O(vertices) where it has not been measured.
   const BoxCorners& box_of(const Scene& scene, std::size_t view, std::size_t mesh);
 
+ private:
   std::vector<std::optional<BoxCorners>> boxes_;  // [mesh] object space, of those measured; not of instances
   std::vector<BoxCorners> boxes_of_views_;
   std::vector<bool> is_known_;  // [mesh]

@@ -103,7 +103,8 @@ void Renderer::Impl::hide_back_faces() {
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
     return;
   std::vector<float> hidden(count);
-  if (may_hide) hidden = pixel_noise->back_faces.hidden(scene, views, depth_reach(scene.smoothing));
+  if (may_hide)
+    hidden = pixel_noise->back_faces.hidden(scene, views, near_plane, depth_reach(scene.smoothing));
   if (hidden == uploaded_hidden_) return;
   uploaded_hidden_.clear();
   hidden_.upload(impl_of(device), hidden);
@@ -384,7 +385,7 @@ std::size_t Renderer::Impl::bytes() const {
          own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + grad_images_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +
          grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
          grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
          grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +

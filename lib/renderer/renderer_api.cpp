@@ -38,8 +38,13 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
 void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors) {
   Impl& m = *impl_;
   m.require_scene("Renderer::set_shapes");
-  if (!positions.empty()) check_values("positions", positions, m.views.size() * m.geometry->position_count);
-  if (!colors.empty()) check_values("colors", colors, m.views.size() * m.geometry->colors);
+  const auto check = [&](const char* name, std::span<const glm::vec3> values, std::size_t of_view) {
+    if (values.empty()) return;
+    require_count(name, values, m.views.size() * of_view);
+    check_values(name, values);
+  };
+  check("positions", positions, m.geometry->position_count);
+  check("colors", colors, m.geometry->colors);
   m.set_shapes(positions, colors);
 }
 
@@ -101,26 +106,6 @@ void Renderer::read_pixels(std::span<glm::vec4> pixels) const {
 }
 
 namespace {
-
-/// A write that reads the host's own memory, which it waits for as it is destroyed.
-class LentWrite {
- public:
-  LentWrite(Device::Impl& device, const cl::Buffer& buffer, std::span<const std::byte> bytes)
-      : device_(device) {
-    check_cl(device.queue.enqueueWriteBuffer(buffer, CL_FALSE, 0, bytes.size(), bytes.data(), nullptr, &run_),
-             "clEnqueueWriteBuffer");
-    device.bytes_to_device += bytes.size();
-  }
-  ~LentWrite() {
-    if (run_.wait() != CL_SUCCESS) device_.queue.finish();
-  }
-  LentWrite(const LentWrite&) = delete;
-  LentWrite& operator=(const LentWrite&) = delete;
-
- private:
-  Device::Impl& device_;
-  cl::Event run_;
-};
 
 /// Of the gradient of all pixels, which is not copied: the host waits for what comes of it anyway.
 SceneGradient backward_from(Renderer::Impl& m, std::span<const std::byte> grad_pixels) {

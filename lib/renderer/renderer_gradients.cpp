@@ -13,42 +13,74 @@ namespace dpr {
 
 using glm::dvec3;
 
-/// Reads parts of joined buffers, with one wait for as many rows as a piece has: rows on the way are held
-/// beside the buffers and the results, when a frame holds the most.
+/// Reads parts of joined buffers by pieces, of which one is on the way while the host takes the other. Few rows take one
+/// wait: rows on the way are held beside the buffers and the results, when a frame holds the most.
 class RowReads {
  public:
-  explicit RowReads(Device::Impl& device) : reads_(device) {}
+  explicit RowReads(Device::Impl& device) : pieces_{Piece(device), Piece(device)} {}
 
   /// All values of a buffer.
-  void add(const Buffer<float>& buffer, std::span<float> out) { buffer.download(out, 0, reads_); }
+  void add(const Buffer<float>& buffer, std::span<float> out) { buffer.download(out, 0, current_->reads); }
   /// Appends rows to `out`, until finish() at the latest.
   template <class Vector>
   void add(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count, std::vector<Vector>& out) {
     out.reserve(count);
     for (const std::size_t end = first + count; first < end;) {
-      if (used_ == k_rows_of_piece) finish();
-      const std::span<cl_float4> piece(rows_.get() + used_, std::min(k_rows_of_piece - used_, end - first));
-      buffer.download(piece, first, reads_);
-      arrivals_.emplace_back([piece, &out] {
-        for (const cl_float4& v : piece) out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
-      });
-      used_ += piece.size();
+      if (current_->used == k_rows_of_piece) {
+        std::swap(current_, other_);
+        current_->finish();
+      }
+      const std::span<cl_float4> piece = current_->room(end - first);
+      buffer.download(piece, first, current_->reads);
+      current_->arrivals.emplace_back([piece, &out] { append(piece, out); });
       first += piece.size();
     }
   }
 
   void finish() {
-    reads_.finish();
-    for (const std::function<void()>& take : arrivals_) take();
-    arrivals_.clear();
-    used_ = 0;
+    other_->finish();
+    current_->finish();
   }
 
  private:
-  std::unique_ptr<cl_float4[]> rows_ = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
-  PendingReads reads_;  // destroyed first, since reads write to the rows
-  std::size_t used_ = 0;
-  std::vector<std::function<void()>> arrivals_;
+  struct Piece {
+    explicit Piece(Device::Impl& device) : reads(device) {}
+
+    std::span<cl_float4> room(std::size_t most) {
+      if (!rows) rows = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
+      const std::span<cl_float4> free(rows.get() + used, std::min(k_rows_of_piece - used, most));
+      used += free.size();
+      return free;
+    }
+    void finish() {
+      reads.finish();
+      for (const std::function<void()>& take : arrivals) take();
+      arrivals.clear();
+      used = 0;
+    }
+
+    std::unique_ptr<cl_float4[]> rows;
+    PendingReads reads;  // destroyed first, since reads write to the rows
+    std::size_t used = 0;
+    std::vector<std::function<void()>> arrivals;
+  };
+
+  template <class Vector>
+  static void append(std::span<const cl_float4> rows, std::vector<Vector>& out) {
+    constexpr std::size_t k_block = 512;  // a vector grows by blocks faster than by elements
+    std::array<Vector, k_block> block;
+    for (std::size_t first = 0; first < rows.size(); first += k_block) {
+      const std::size_t count = std::min(k_block, rows.size() - first);
+      for (std::size_t i = 0; i < count; ++i) {
+        const cl_float4& v = rows[first + i];
+        block[i] = Vector(glm::vec3(v.s[0], v.s[1], v.s[2]));
+      }
+      out.insert(out.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+  }
+
+  std::array<Piece, 2> pieces_;
+  Piece *current_ = &pieces_[0], *other_ = &pieces_[1];
 };
 
 bool Renderer::Impl::wants(ArrayId id) const {

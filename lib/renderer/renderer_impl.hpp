@@ -221,7 +221,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
             std::size_t first_view) const;
   void set(ViewSet& prepared) noexcept;
   template <class Element>
-  void replace(Buffer<cl_float4>& buffer, std::size_t first, std::span<const Element> elements);
+  void replace(const ArrayRef& at, std::vector<Element>& held, std::span<const Element> elements);
   Buffer<cl_float4>& spare_for(const Buffer<cl_float4>& buffer);
 
   ShadeInputs shade_inputs() {
@@ -296,6 +296,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   // Buffers in which the next setter prepares its values.
   ViewSet spare_views_;
   Buffer<cl_float4> spare_values_, spare_view_positions_, spare_view_colors_;
+  Buffer<float> packed_;                  // vectors as the host has them
+  std::vector<glm::vec3> spare_vectors_;  // of the host
 };
 
 }  // namespace dpr
