@@ -113,3 +113,49 @@ DPR_SHARING_KERNEL kernel void setup_forward(
   }
 #endif
 }
+
+/// Six times the volumes of the tetrahedra between a mesh's first position and its faces: their sum is the volume of a
+/// closed mesh, above 0 where faces wind counter-clockwise as seen from outside. One work-item per DPR_VOLUME_FACES faces.
+/// in   first     uint4                  of the mesh: face, faces, vertex less position, position
+/// in   runs      work-items of the mesh
+/// in   faces     uint4[face]            vertex indices
+/// in   positions float4[position]       object space
+/// out  volumes   float[2][run]          sums; sums of magnitudes
+kernel void setup_volumes(const uint4 first, const uint runs, global const uint4* restrict faces,
+                          global const float4* restrict positions, global float* restrict volumes) {
+  const uint run = (uint)get_global_id(0);
+  if (run >= runs) return;
+  const float3 origin = positions[first.w].xyz;
+  const uint begin = run * DPR_VOLUME_FACES, end = min(begin + DPR_VOLUME_FACES, first.y);
+  float sum = 0.0f, magnitude = 0.0f;
+  for (uint i = begin; i < end; ++i) {
+    const uint4 face = faces[first.x + i];
+    const float3 a = positions[face.x - first.z].xyz - origin, b = positions[face.y - first.z].xyz - origin,
+                 c = positions[face.z - first.z].xyz - origin;
+    const float volume = dot(a, cross(b, c));
+    sum += volume;
+    magnitude += fabs(volume);
+  }
+  volumes[run] = sum;
+  volumes[runs + run] = magnitude;
+}
+
+/// Part of the magnitudes that a volume must have for its sign to count.
+#define DPR_LEAST_VOLUME 1e-4f
+
+/// The orientation of faces that nothing can see, from that of meshes whose faces wind counter-clockwise. One
+/// work-item per (view, mesh). Written so that a NaN hides nothing.
+/// in   p
+/// in   sources   uint[mesh]             itself, or the mesh of which it is an instance
+/// in   volumes   float[mesh][2]         as setup_volumes has them, summed
+/// in   assumed   float[view][mesh]
+/// out  hidden    float[view][mesh]
+kernel void setup_hidden(const FrameParams p, global const uint* restrict sources,
+                         global const float* restrict volumes, global const float* restrict assumed,
+                         global float* restrict hidden) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= p.views * p.meshes) return;
+  const uint source = sources[i % p.meshes];
+  const float volume = volumes[2 * source], least = DPR_LEAST_VOLUME * volumes[2 * source + 1];
+  hidden[i] = volume > least ? assumed[i] : volume < -least ? -assumed[i] : 0.0f;
+}

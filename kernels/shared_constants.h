@@ -41,6 +41,9 @@
 /// together, which matters where neighbours in the mesh are none in its lists.
 #define DPR_FACE_GROUP 8
 
+/// Faces of a work-item that measures volumes.
+#define DPR_VOLUME_FACES 32
+
 /// The logarithm of an occupancy of zero: far below any other, yet finite, so that nothing turns into a NaN.
 #define DPR_LOG_ZERO (-1e30f)
 

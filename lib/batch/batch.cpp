@@ -38,7 +38,7 @@ View neutral_view() {
 void upload_settings(Renderer& renderer, std::span<const View> views, const std::optional<Lights>& lights,
                      const Smoothing& smoothing, std::size_t first_view) {
   const auto set = [&] {
-    renderer.set_smoothing(smoothing);
+    if (renderer.scene().smoothing != smoothing) renderer.set_smoothing(smoothing);
     if (lights || renderer.scene().lights) renderer.set_lights(lights);
     renderer.set_views(views, first_view);
   };

@@ -18,6 +18,8 @@ class Solid {
   /// the parts' volumes. 0 where they differ, or one is not closed or not finite. A part of faces with
   /// vertices of their own is closed where those coincide. O(faces).
   int winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const;
+  /// True for faces that are one closed part wherever the vertices lie: then winding() is the sign of the volume.
+  bool is_one_part() const { return may_be_closed_ && open_edges_.empty() && patches_ == 1; }
 
  private:
   bool may_be_closed_ = false;

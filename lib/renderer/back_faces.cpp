@@ -1,5 +1,7 @@
 #include "renderer/back_faces.hpp"
 
+#include <algorithm>
+
 namespace dpr {
 
 BackFaces::BackFaces(std::vector<Solid> solids) : states_(solids.size()) {
@@ -9,15 +11,23 @@ BackFaces::BackFaces(std::vector<Solid> solids) : states_(solids.size()) {
 void BackFaces::move(std::size_t mesh) noexcept { states_[mesh].is_measured = false; }
 
 void BackFaces::forget(std::size_t mesh) noexcept {
-  move(mesh);
-  states_[mesh].is_measured = true;
-  states_[mesh].winding = 0;
+  states_[mesh] = {std::move(states_[mesh].solid), /*is_measured*/ true};
 }
 
-void BackFaces::measure(State& state, const Mesh& mesh) {
-  state.is_measured = true;
-  state.winding = state.solid.winding(mesh.positions, mesh.faces);
+void BackFaces::measure(const Scene& scene, const std::function<void(std::size_t mesh)>& measure_on_device) {
+  constexpr std::size_t k_many_faces = 1U << 16U;
+  for (std::size_t m = 0; m < states_.size(); ++m) {
+    State& state = states_[m];
+    if (state.is_measured || scene.meshes[m].instance_of) continue;
+    const Mesh& mesh = scene.meshes[m].mesh;
+    state.is_on_device = mesh.faces.size() >= k_many_faces && state.solid.is_one_part();
+    if (state.is_on_device) measure_on_device(m);
+    state.winding = state.is_on_device ? 1 : state.solid.winding(mesh.positions, mesh.faces);
+    state.is_measured = true;
+  }
 }
+
+bool BackFaces::are_on_device() const { return std::ranges::any_of(states_, &State::is_on_device); }
 
 float BackFaces::hidden_of(int winding, const BoxCorners& box, const Camera& camera, const glm::mat4& model,
                            float depth_reach) {
@@ -34,10 +44,7 @@ float BackFaces::hidden_of(int winding, const BoxCorners& box, const Camera& cam
 }
 
 std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
-                                     float depth_reach) {
-  for (std::size_t m = 0; m < states_.size(); ++m) {
-    if (!states_[m].is_measured && !scene.meshes[m].instance_of) measure(states_[m], scene.meshes[m].mesh);
-  }
+                                     float depth_reach) const {
   std::vector<float> hidden;
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (std::size_t m = 0; m < states_.size(); ++m) {

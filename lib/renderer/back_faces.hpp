@@ -1,6 +1,7 @@
 // Faces that nothing can see, because they are the far side of a solid.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -21,20 +22,25 @@ class BackFaces {
   /// Only the device knows them: all faces may be seen.
   void forget(std::size_t mesh) noexcept;
 
+  /// Finds how the faces of meshes that have moved wind. That of large meshes of one part is the device's to measure, by
+  /// the sign of their volume: it is called for these. O(faces of the others).
+  void measure(const Scene& scene, const std::function<void(std::size_t mesh)>& measure_on_device);
+  /// True if the device has measured a mesh.
+  bool are_on_device() const;
   /// [view][mesh] the orientation in NDC, +1 or -1, of faces that cannot be seen; 0: all may be. They may not
   /// where the mesh bounds a solid that lies wholly behind the near plane, thicker by far than the depth
   /// (normalised) by which the noise of the depths shows what lies behind. Where a mesh passes through itself
-  /// such that its inside is outside, its far side is seen there. O(faces of meshes moved + views * meshes).
+  /// such that its inside is outside, its far side is seen there. Meshes that the device measures count as
+  /// counter-clockwise.
   std::vector<float> hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
-                            float depth_reach);
+                            float depth_reach) const;
 
  private:
   struct State {
     Solid solid;
-    bool is_measured = false;
+    bool is_measured = false, is_on_device = false;
     int winding = 0;
   };
-  static void measure(State& state, const Mesh& mesh);
   static float hidden_of(int winding, const BoxCorners& box, const Camera& camera, const glm::mat4& model,
                          float depth_reach);
 

@@ -1,7 +1,9 @@
 #include "renderer/pixel_noise.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "renderer/renderer_impl.hpp"
 #include "smoothing/priors.hpp"
 
 namespace dpr {
@@ -164,6 +166,45 @@ std::size_t PixelNoise::bytes() const {
          (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
          grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes() + moved_raster_.capacity_bytes() +
          moved_image_.capacity_bytes();
+}
+
+void Renderer::Impl::find_edges() {
+  if (!pixel_noise) return;
+  if (!pixel_noise->edges) {
+    pixel_noise->edges.emplace(impl_of(device), scene);
+    pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
+    setup.forget_volumes();
+    for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
+      if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
+    }
+    has_moved = true;
+  }
+  if (has_moved) pixel_noise->edges->join(frame, *geometry);
+  has_moved = false;
+}
+
+/// Hides no faces of views with shapes of their own, of which none are known to be hidden.
+void Renderer::Impl::hide_back_faces() {
+  const std::size_t count = views.size() * scene.meshes.size();
+  const bool may_hide =
+      pixel_noise && frame.position_stride == 0 && !has_device_poses && scene.cull == Cull::none;
+  const auto hides_none = [](float orientation) { return orientation == 0; };
+  if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none)) {
+    hides_by_device_ = false;
+    return;
+  }
+  std::vector<float> hidden(count);
+  hides_by_device_ = false;
+  if (may_hide) {
+    BackFaces& back_faces = pixel_noise->back_faces;
+    back_faces.measure(scene, [&](std::size_t mesh) { setup.measure(*geometry, scene, mesh); });
+    hides_by_device_ = back_faces.are_on_device();
+    hidden = back_faces.hidden(scene, views, near_plane, depth_reach(scene.smoothing));
+  }
+  if (hidden == uploaded_hidden_) return;
+  uploaded_hidden_.clear();
+  hidden_.upload(impl_of(device), hidden);
+  uploaded_hidden_ = std::move(hidden);
 }
 
 }  // namespace dpr

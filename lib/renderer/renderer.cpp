@@ -80,37 +80,6 @@ void Renderer::Impl::build_pyramids() {
   geometry->textures.has_levels = true;
 }
 
-void Renderer::Impl::find_edges() {
-  if (!pixel_noise) return;
-  if (!pixel_noise->edges) {
-    pixel_noise->edges.emplace(impl_of(device), scene);
-    pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
-    for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
-      if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
-    }
-    has_moved = true;
-  }
-  if (has_moved) pixel_noise->edges->join(frame, *geometry);
-  has_moved = false;
-}
-
-/// Hides no faces of views with shapes of their own, of which none are known to be hidden.
-void Renderer::Impl::hide_back_faces() {
-  const std::size_t count = views.size() * scene.meshes.size();
-  const bool may_hide =
-      pixel_noise && frame.position_stride == 0 && !has_device_poses && scene.cull == Cull::none;
-  const auto hides_none = [](float orientation) { return orientation == 0; };
-  if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none))
-    return;
-  std::vector<float> hidden(count);
-  if (may_hide)
-    hidden = pixel_noise->back_faces.hidden(scene, views, near_plane, depth_reach(scene.smoothing));
-  if (hidden == uploaded_hidden_) return;
-  uploaded_hidden_.clear();
-  hidden_.upload(impl_of(device), hidden);
-  uploaded_hidden_ = std::move(hidden);
-}
-
 void Renderer::Impl::set_up() {
   frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
   frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
@@ -121,7 +90,8 @@ void Renderer::Impl::set_up() {
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
   if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
-  setup.forward(frame, device_views, *geometry, transform.ndc, hidden_, bin.pair_starts);
+  const Buffer<float>& hidden = hides_by_device_ ? setup.hide(frame, hidden_) : hidden_;
+  setup.forward(frame, device_views, *geometry, transform.ndc, hidden, bin.pair_starts);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup, bin.pair_starts);
   bin.start();
 }

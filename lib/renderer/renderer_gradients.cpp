@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 
+#include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/light_table.hpp"
 #include "scene/projection_slopes.hpp"
@@ -32,14 +33,16 @@ class RowReads {
       }
       const std::span<cl_float4> piece = current_->room(end - first);
       buffer.download(piece, first, current_->reads);
-      current_->arrivals.emplace_back([piece, &out] { append(piece, out); });
+      current_->arrivals.emplace_back([this, piece, &out] { append(piece, out); });
       first += piece.size();
     }
   }
 
-  void finish() {
+  /// Returns whether all rows are finite.
+  bool finish() {
     other_->finish();
     current_->finish();
+    return are_finite_;
   }
 
  private:
@@ -66,7 +69,7 @@ class RowReads {
   };
 
   template <class Vector>
-  static void append(std::span<const cl_float4> rows, std::vector<Vector>& out) {
+  void append(std::span<const cl_float4> rows, std::vector<Vector>& out) {
     constexpr std::size_t k_block = 512;  // a vector grows by blocks faster than by elements
     std::array<Vector, k_block> block;
     for (std::size_t first = 0; first < rows.size(); first += k_block) {
@@ -75,10 +78,14 @@ class RowReads {
         const cl_float4& v = rows[first + i];
         block[i] = Vector(glm::vec3(v.s[0], v.s[1], v.s[2]));
       }
-      out.insert(out.end(), block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count));
+      const std::span<const Vector> taken(block.data(), count);
+      const std::span<const float> numbers = checks::floats_of(taken);
+      are_finite_ = are_finite_ && checks::first_not_finite(numbers) == numbers.size();
+      out.insert(out.end(), taken.begin(), taken.end());
     }
   }
 
+  bool are_finite_ = true;
   std::array<Piece, 2> pieces_;
   Piece *current_ = &pieces_[0], *other_ = &pieces_[1];
 };
@@ -114,9 +121,9 @@ SceneGradient Renderer::Impl::read_gradient() {
   RowReads reads(impl_of(device));
   reads.add(gradient_sums_, sums);
   read_mesh_gradients(by_mesh, reads);
-  reads.finish();
+  const bool has_finite_rows = reads.finish();
   SceneGradient gradient = finish_summed_gradients(sums, std::move(by_mesh));
-  require_finite(gradient);
+  require_finite(gradient, has_finite_rows);
   return gradient;
 }
 

@@ -6,8 +6,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "base/checks.hpp"
-#include "mesh/bounding_box.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 #include "smoothing/priors.hpp"
@@ -19,9 +17,6 @@ namespace {
 static_assert(std::is_nothrow_swappable_v<Scene> && std::is_nothrow_swappable_v<ViewSet> &&
               std::is_nothrow_swappable_v<NearPlane>);
 static_assert(std::is_nothrow_move_constructible_v<Geometry> && std::is_nothrow_move_assignable_v<Geometry>);
-
-/// Vectors of which the host makes rows of four floats; of more the device does.
-constexpr std::size_t k_most_rows_made = k_rows_of_piece;
 
 /// A row of an affine matrix: linear part and translation.
 cl_float4 matrix_row(const glm::mat4& m, int row) { return {{m[0][row], m[1][row], m[2][row], m[3][row]}}; }
@@ -308,102 +303,6 @@ void Renderer::Impl::set_cull(Cull cull) noexcept {
   scene.cull = cull;
   frame.culled = culled_orientation(cull);
   rendered = false;
-}
-
-void Renderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {
-  const HostArray held = row_of(at.id).host(scene.meshes[at.mesh].mesh, at.texture);
-  const auto replace_with = [&]<class Element>(std::span<const Element> elements) {
-    replace(at, *std::get<std::vector<Element>*>(held), elements);
-  };
-  std::visit(replace_with, values);
-  rendered = false;
-}
-
-/// Buffer in which the copy that takes a buffer's place is prepared: one that nothing reads between a
-/// backward pass and the next, if that is as long.
-Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
-  const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
-  Buffer<cl_float4>& spare = buffer.size() == vertices ? grad_vertices : spare_values_;
-  spare.resize(impl_of(device), buffer.size());
-  return spare;
-}
-
-namespace {
-
-/// A checked copy of vectors, and of positions the box around them, in one pass over memory.
-template <class Vector>
-void copy_checked(const char* name, std::span<const Vector> from, std::vector<Vector>& to, Bounds* box) {
-  constexpr std::size_t k_block = 1024;
-  to.clear();
-  to.reserve(from.size());
-  for (std::size_t first = 0; first < from.size(); first += k_block) {
-    const std::span<const Vector> block = from.subspan(first, std::min(k_block, from.size() - first));
-    require_finite(name, block, first);
-    to.insert(to.end(), block.begin(), block.end());
-    if constexpr (std::is_same_v<Vector, glm::vec3>) {
-      if (box == nullptr) continue;
-      const Bounds of_block = bounding_box(block);
-      *box = first == 0 ? of_block
-                        : Bounds{glm::min(box->low, of_block.low), glm::max(box->high, of_block.high)};
-    }
-  }
-}
-
-template <class Element>
-std::vector<cl_float4> rows_of(std::span<const Element> elements) {
-  std::vector<cl_float4> rows;
-  rows.reserve(elements.size());
-  for (const Element& e : elements) {
-    if constexpr (std::is_same_v<Element, Material>) {
-      rows.push_back(to_cl(e));
-    } else {
-      rows.push_back(to_cl(to_vec3(e)));
-    }
-  }
-  return rows;
-}
-
-}  // namespace
-
-/// Puts elements in the place of an array's. Many go to the device as they are, where they become rows of four floats, while
-/// the host copies them.
-template <class Element>
-void Renderer::Impl::replace(const ArrayRef& at, std::vector<Element>& held,
-                             std::span<const Element> elements) {
-  constexpr bool is_vector = !std::is_same_v<Element, Material>;
-  const MeshArray& row = row_of(at.id);
-  Buffer<cl_float4>& buffer = row.device(*geometry);
-  const std::size_t first = row.first(*geometry, at);
-  const bool has_box = at.id == ArrayId::positions;
-  Bounds box{};
-  std::vector<Element> copy;
-  Buffer<cl_float4>& spare = spare_for(buffer);
-  if (elements.size() < buffer.size()) buffer.copy_to(spare);
-  if constexpr (is_vector) {
-    if constexpr (std::is_same_v<Element, glm::vec3>) {
-      if (spare_vectors_.size() == elements.size()) copy = std::move(spare_vectors_);
-    }
-    std::optional<LentWrite> write;
-    if (elements.size() > k_most_rows_made) {
-      const std::span<const float> numbers = checks::floats_of(elements);
-      packed_.resize(impl_of(device), numbers.size());
-      write.emplace(impl_of(device), packed_.cl_buffer(), std::as_bytes(numbers));
-      made_exchange().take(vectors_of(packed_, 0, sizeof(Element) / sizeof(float)), elements.size(), spare,
-                           first);
-    }
-    copy_checked(row.name, elements, copy, has_box ? &box : nullptr);
-  } else {
-    check_values(row.name, elements);
-    copy.assign(elements.begin(), elements.end());
-  }
-  if (!is_vector || elements.size() <= k_most_rows_made)
-    write_range(impl_of(device), spare, first, rows_of(elements));
-
-  std::swap(buffer, spare);
-  std::swap(held, copy);
-  if constexpr (std::is_same_v<Element, glm::vec3>) spare_vectors_ = std::move(copy);
-  row.changed(*this, at.mesh, /*on_host*/ true);
-  if (has_box && !elements.empty()) near_plane.set_box(at.mesh, box_corners(box));
 }
 
 }  // namespace dpr

@@ -254,14 +254,6 @@ class GradientSum {
   SceneGradient last_;
 };
 
-/// True for vectors that are all finite, of which there may be millions.
-bool has_finite_vectors(const GradientArray& array) {
-  const auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array);
-  if (vectors == nullptr) return false;
-  const std::span<const float> numbers = checks::floats_of(std::span<const glm::vec3>(**vectors));
-  return checks::first_not_finite(numbers) == numbers.size();
-}
-
 [[noreturn]] void refuse_gradient(const std::string& name, double value) {
   throw InvalidArgument("gradient of " + name + " (backward)", checks::text(value),
                         "a finite number; the scene's lengths or the smoothing are beyond single precision");
@@ -276,8 +268,8 @@ SceneGradient sum_of(std::vector<SceneGradient>&& parts) {
   return sum.finish();
 }
 
-void require_finite(SceneGradient& gradient) {
-  for_each_array(gradient, [](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+void require_finite(SceneGradient& gradient, bool has_finite_vectors) {
+  for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
     std::size_t count = 0;
     const auto check = [&](double value) {
       if (!std::isfinite(value)) {
@@ -290,7 +282,10 @@ void require_finite(SceneGradient& gradient) {
       ++count;
       return value;
     };
-    if (!has_finite_vectors(array)) transform_numbers(array, check);
+    const bool is_known = has_finite_vectors &&
+                          (row.of == GradientOf::mesh || row.of == GradientOf::all_views) &&
+                          row.wanted != &Request::materials;
+    if (!is_known) transform_numbers(array, check);
   });
 }
 
