@@ -120,7 +120,7 @@ DPR_SHARING_KERNEL kernel void setup_forward(
 /// in   runs      work-items of the mesh
 /// in   faces     uint4[face]            vertex indices
 /// in   positions float4[position]       object space
-/// out  volumes   float[2][run]          sums; sums of magnitudes
+/// out  volumes   float[2][run]          sums; sums of the products of lengths that rounding is in proportion to
 kernel void setup_volumes(const uint4 first, const uint runs, global const uint4* restrict faces,
                           global const float4* restrict positions, global float* restrict volumes) {
   const uint run = (uint)get_global_id(0);
@@ -130,18 +130,17 @@ kernel void setup_volumes(const uint4 first, const uint runs, global const uint4
   float sum = 0.0f, magnitude = 0.0f;
   for (uint i = begin; i < end; ++i) {
     const uint4 face = faces[first.x + i];
-    const float3 a = positions[face.x - first.z].xyz - origin, b = positions[face.y - first.z].xyz - origin,
-                 c = positions[face.z - first.z].xyz - origin;
-    const float volume = dot(a, cross(b, c));
-    sum += volume;
-    magnitude += fabs(volume);
+    const float3 a = positions[face.x - first.z].xyz, b = positions[face.y - first.z].xyz - a,
+                 c = positions[face.z - first.z].xyz - a, side = a - origin;
+    sum += dot(side, cross(b, c));
+    magnitude += sqrt(dot(side, side) * dot(b, b) * dot(c, c));
   }
   volumes[run] = sum;
   volumes[runs + run] = magnitude;
 }
 
-/// Part of the magnitudes that a volume must have for its sign to count.
-#define DPR_LEAST_VOLUME 1e-4f
+/// Part of the products of lengths that a volume must have for its sign to count: what is less may be rounding.
+#define DPR_LEAST_VOLUME 1e-5f
 
 /// The orientation of faces that nothing can see, from that of meshes whose faces wind counter-clockwise. One
 /// work-item per (view, mesh). Written so that a NaN hides nothing.

@@ -14,80 +14,64 @@ namespace dpr {
 
 using glm::dvec3;
 
-/// Reads parts of joined buffers by pieces, of which one is on the way while the host takes the other. Few rows take one
-/// wait: rows on the way are held beside the buffers and the results, when a frame holds the most.
+/// Reads parts of joined buffers with one wait. Few rows come as they are; of many the device packs the vectors, which go
+/// where they belong.
 class RowReads {
  public:
-  explicit RowReads(Device::Impl& device) : pieces_{Piece(device), Piece(device)} {}
+  explicit RowReads(Renderer::Impl& renderer, Buffer<float>& packed)
+      : renderer_(renderer), packed_(packed), reads_(impl_of(renderer.device)) {}
 
   /// All values of a buffer.
-  void add(const Buffer<float>& buffer, std::span<float> out) { buffer.download(out, 0, current_->reads); }
-  /// Appends rows to `out`, until finish() at the latest.
+  void add(const Buffer<float>& buffer, std::span<float> out) { buffer.download(out, 0, reads_); }
+  /// Fills `out`, which is empty, until finish() at the latest.
   template <class Vector>
   void add(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count, std::vector<Vector>& out) {
-    out.reserve(count);
-    for (const std::size_t end = first + count; first < end;) {
-      if (current_->used == k_rows_of_piece) {
-        std::swap(current_, other_);
-        current_->finish();
-      }
-      const std::span<cl_float4> piece = current_->room(end - first);
-      buffer.download(piece, first, current_->reads);
-      current_->arrivals.emplace_back([this, piece, &out] { append(piece, out); });
-      first += piece.size();
-    }
+    if (count > k_rows_of_piece) return add_packed(buffer, first, count, out);
+    if (used_ + count > k_rows_of_piece) finish();
+    const std::span<cl_float4> rows(rows_.get() + used_, count);
+    buffer.download(rows, first, reads_);
+    arrivals_.emplace_back([rows, &out] {
+      out.reserve(rows.size());
+      for (const cl_float4& v : rows) out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
+      return is_finite(out);
+    });
+    used_ += count;
   }
 
   /// Returns whether all rows are finite.
   bool finish() {
-    other_->finish();
-    current_->finish();
+    reads_.finish();
+    for (const std::function<bool()>& take : arrivals_) are_finite_ = take() && are_finite_;
+    arrivals_.clear();
+    used_ = 0;
     return are_finite_;
   }
 
  private:
-  struct Piece {
-    explicit Piece(Device::Impl& device) : reads(device) {}
-
-    std::span<cl_float4> room(std::size_t most) {
-      if (!rows) rows = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
-      const std::span<cl_float4> free(rows.get() + used, std::min(k_rows_of_piece - used, most));
-      used += free.size();
-      return free;
-    }
-    void finish() {
-      reads.finish();
-      for (const std::function<void()>& take : arrivals) take();
-      arrivals.clear();
-      used = 0;
-    }
-
-    std::unique_ptr<cl_float4[]> rows;
-    PendingReads reads;  // destroyed first, since reads write to the rows
-    std::size_t used = 0;
-    std::vector<std::function<void()>> arrivals;
-  };
-
   template <class Vector>
-  void append(std::span<const cl_float4> rows, std::vector<Vector>& out) {
-    constexpr std::size_t k_block = 512;  // a vector grows by blocks faster than by elements
-    std::array<Vector, k_block> block;
-    for (std::size_t first = 0; first < rows.size(); first += k_block) {
-      const std::size_t count = std::min(k_block, rows.size() - first);
-      for (std::size_t i = 0; i < count; ++i) {
-        const cl_float4& v = rows[first + i];
-        block[i] = Vector(glm::vec3(v.s[0], v.s[1], v.s[2]));
-      }
-      const std::span<const Vector> taken(block.data(), count);
-      const std::span<const float> numbers = checks::floats_of(taken);
-      are_finite_ = are_finite_ && checks::first_not_finite(numbers) == numbers.size();
-      out.insert(out.end(), taken.begin(), taken.end());
-    }
+  void add_packed(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t count,
+                  std::vector<Vector>& out) {
+    constexpr std::size_t k_components = sizeof(Vector) / sizeof(float);
+    out.resize(count);
+    packed_.resize(impl_of(renderer_.device), k_components * count);
+    renderer_.made_exchange().give(vectors_of(buffer, first, 4), count, vectors_of(packed_, 0, k_components));
+    packed_.download({&out.front().x, k_components * count}, 0, reads_);
+    arrivals_.emplace_back([&out] { return is_finite(out); });
   }
 
+  template <class Vector>
+  static bool is_finite(const std::vector<Vector>& vectors) {
+    const std::span<const float> numbers = checks::floats_of(std::span(vectors));
+    return checks::first_not_finite(numbers) == numbers.size();
+  }
+
+  Renderer::Impl& renderer_;
+  Buffer<float>& packed_;  // of one array after the other: the queue is in order
+  std::unique_ptr<cl_float4[]> rows_ = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
+  PendingReads reads_;  // destroyed first, since reads write to the rows
+  std::size_t used_ = 0;
   bool are_finite_ = true;
-  std::array<Piece, 2> pieces_;
-  Piece *current_ = &pieces_[0], *other_ = &pieces_[1];
+  std::vector<std::function<bool()>> arrivals_;
 };
 
 bool Renderer::Impl::wants(ArrayId id) const {
@@ -118,7 +102,7 @@ SceneGradient Renderer::Impl::read_gradient() {
   std::vector<float> sums(gradient_sums_.size());
   SceneGradient by_mesh;
   by_mesh.meshes.resize(scene.meshes.size());
-  RowReads reads(impl_of(device));
+  RowReads reads(*this, packed_);
   reads.add(gradient_sums_, sums);
   read_mesh_gradients(by_mesh, reads);
   const bool has_finite_rows = reads.finish();

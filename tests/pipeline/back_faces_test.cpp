@@ -11,6 +11,7 @@ namespace back_faces_test {
 
 using namespace dpr;
 using namespace dpr::test::pipeline;
+using dpr::test::is_reduced;
 using dpr::test::reduced;
 
 namespace {
@@ -133,6 +134,47 @@ TEST_SUITE("pipeline") {
     const Seen turned = see(renderer);
     check_same(turned, see(scene));
     CHECK(turned.image.pixels == see(scene).image.pixels);
+  }
+
+  TEST_CASE("back faces: of large solids, which the device measures, inside out, mirrored and moved") {
+    if (is_reduced()) return;
+    const Mesh ball = make_icosphere(6);
+    Renderer renderer(open_device());
+    for (const bool turned : {false, true}) {
+      for (const float side : {1.0F, -1.0F}) {
+        Scene scene = scene_with(turned ? inside_out(ball) : ball);
+        scene.meshes[0].transform = glm::scale(scene.meshes[0].transform, glm::vec3(side, 1, 1));
+        Scene whole = scene;
+        whole.meshes[0].mesh = opened(scene.meshes[0].mesh);
+        renderer.set_scene(scene);
+        const Seen found = see(renderer), expected = see(whole);
+        CHECK(found.kept < expected.kept);
+        check_same(found, expected);
+        for (glm::vec3& p : scene.meshes[0].mesh.positions) p = -p;
+        renderer.set_positions(0, scene.meshes[0].mesh.positions);
+        const Seen moved = see(renderer);
+        CHECK(moved.kept < expected.kept);
+        CHECK(moved.image.pixels == see(scene).image.pixels);
+      }
+    }
+  }
+
+  TEST_CASE("back faces: a large flat solid has no sides, and one beside a small one has its own") {
+    if (is_reduced()) return;
+    Mesh flat = make_icosphere(6);
+    for (glm::vec3& p : flat.positions) p.x = 0.5F * p.z;
+    Scene scene = scene_with(flat), whole = scene;
+    whole.meshes[0].mesh = opened(flat);
+    CHECK(see(scene).kept == see(whole).kept);
+    scene = scene_with(make_cube());
+    const auto ball = scene.meshes[0];
+    scene.meshes.push_back({inside_out(make_icosphere(6)), ball.transform});
+    scene.meshes.push_back({{}, glm::translate(ball.transform, glm::vec3(0.5F)), 1});
+    whole = scene;
+    whole.meshes[1].mesh = opened(scene.meshes[1].mesh);
+    const Seen found = see(scene), expected = see(whole);
+    CHECK(found.kept < expected.kept);
+    check_same(found, expected);
   }
 
   TEST_CASE("back faces: a mesh that moves as a whole looks as it does in a new scene") {

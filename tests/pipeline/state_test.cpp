@@ -3,6 +3,7 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "pipeline/device_buffers.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/caller.hpp"
+#include "support/messages.hpp"
 #include "support/reduced.hpp"
 
 namespace state_test {
@@ -192,6 +194,36 @@ TEST_SUITE("pipeline") {
       largest = std::max({largest, off.x, off.y, off.z, off.w});
     }
     CHECK(largest < 1e-5F);
+  }
+
+  TEST_CASE("state: large arrays, which the device takes as they are, are checked and set like small ones") {
+    if (is_reduced()) return;
+    constexpr std::size_t k_bad = 150'000;
+    Scene scene = scene_of(make_icosphere(7), size(), size());
+    scene.smoothing = smoothing_preset("pixel");
+    Renderer renderer(open_device());
+    renderer.set_scene(scene);
+    const Result before = render(renderer);
+    Mesh& mesh = scene.meshes[0].mesh;
+    std::vector<glm::vec3> wrong = mesh.positions;
+    wrong[k_bad].y = std::numeric_limits<float>::quiet_NaN();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_positions(0, wrong), "positions[150000]");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_colors(0, wrong), "colors[150000]");
+    wrong.pop_back();
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_positions(0, wrong), "163841 vectors");
+    CHECK(renderer.scene().meshes[0].mesh.positions == mesh.positions);
+    CHECK(render(renderer).image.pixels == before.image.pixels);
+    for (int step = 0; step < 3; ++step) {
+      for (glm::vec3& p : mesh.positions) p *= glm::vec3(0.9F, 0.95F, 1);
+      for (glm::vec3& color : mesh.vertex_colors) color *= 0.9F;
+      renderer.set_positions(0, mesh.positions);
+      renderer.set_colors(0, mesh.vertex_colors);
+      const Result moved = render(renderer), expected = render(open_device(), scene);
+      CHECK(renderer.scene().meshes[0].mesh.positions == mesh.positions);
+      CHECK(moved.image.pixels == expected.image.pixels);
+      CHECK(moved.gradient.meshes[0].positions == expected.gradient.meshes[0].positions);
+      CHECK(moved.gradient.meshes[0].colors == expected.gradient.meshes[0].colors);
+    }
   }
 
   TEST_CASE("state: what the renderer says it holds is what the device has allocated") {
