@@ -22,6 +22,27 @@ kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 t
   }
 }
 
+/// Vectors of three floats to rows of four, the last 0, of which the first is row `first`; and back. One work-item per
+/// vector: what exchange_vectors does for one layout, several times as fast on CPUs.
+/// in   count   vectors
+/// in   packed  float[3 count]
+/// out  rows    float4[first + count]
+kernel void exchange_unpack(const uint count, const uint first, global const float* restrict packed,
+                            global float4* restrict rows) {
+  const uint i = (uint)get_global_id(0);
+  if (i < count) rows[first + i] = (float4)(packed[3 * i], packed[3 * i + 1], packed[3 * i + 2], 0.0f);
+}
+
+kernel void exchange_pack(const uint count, const uint first, global const float4* restrict rows,
+                          global float* restrict packed) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= count) return;
+  const float4 row = rows[first + i];
+  packed[3 * i] = row.x;
+  packed[3 * i + 1] = row.y;
+  packed[3 * i + 2] = row.z;
+}
+
 static inline float4 finite_row(global const float* row) {
   return (float4)(isfinite(row[0]) ? row[0] : 0.0f, isfinite(row[1]) ? row[1] : 0.0f,
                   isfinite(row[2]) ? row[2] : 0.0f, isfinite(row[3]) ? row[3] : 0.0f);

@@ -25,6 +25,20 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<float>& 
   copy(from, count, vectors_of(to, 0, components), true);
 }
 
+void Exchange::unpack(const Buffer<float>& packed, std::size_t components, std::size_t count,
+                      Buffer<cl_float4>& to, std::size_t first) {
+  if (components != 3) return take(vectors_of(packed, 0, components), count, to, first);
+  launch_(count, kernel::exchange_unpack{
+                     .count = to_uint(count), .first = to_uint(first), .packed = packed, .rows = to});
+}
+
+void Exchange::pack(const Buffer<cl_float4>& from, std::size_t first, std::size_t components,
+                    std::size_t count, Buffer<float>& packed) {
+  if (components != 3) return give(vectors_of(from, first, 4), count, vectors_of(packed, 0, components));
+  launch_(count, kernel::exchange_pack{
+                     .count = to_uint(count), .first = to_uint(first), .rows = from, .packed = packed});
+}
+
 void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                             Buffer<shared::ViewParams>& cameras) {
   launch_(count, kernel::exchange_cameras{.count = to_uint(count),

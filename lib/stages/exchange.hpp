@@ -32,6 +32,11 @@ class Exchange {
   void take(const FloatVectors& from, std::size_t count, Buffer<cl_float4>& to, std::size_t first);
   /// The same to packed vectors of so many floats, from the first element on.
   void take(const FloatVectors& from, std::size_t count, Buffer<float>& to, std::size_t components);
+  /// From `count` packed vectors of two or three finite floats to elements of `to` from `first` on, and back.
+  void unpack(const Buffer<float>& packed, std::size_t components, std::size_t count, Buffer<cl_float4>& to,
+              std::size_t first);
+  void pack(const Buffer<cl_float4>& from, std::size_t first, std::size_t components, std::size_t count,
+            Buffer<float>& packed);
   /// From `count` world-to-camera matrices, of three rows each, to what cameras have of them.
   void take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                     Buffer<shared::ViewParams>& cameras);
@@ -43,7 +48,9 @@ class Exchange {
   void copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean);
 
   Device::Impl& device_;
-  Launcher<kernel::exchange_vectors, kernel::exchange_cameras, kernel::exchange_map> launch_;
+  Launcher<kernel::exchange_vectors, kernel::exchange_unpack, kernel::exchange_pack, kernel::exchange_cameras,
+           kernel::exchange_map>
+      launch_;
 };
 
 /// Elements of a buffer from `first` on, `components` of each.
