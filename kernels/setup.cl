@@ -114,8 +114,9 @@ DPR_SHARING_KERNEL kernel void setup_forward(
 #endif
 }
 
-/// Six times the volumes of the tetrahedra between a mesh's first position and its faces: their sum is the volume of a
-/// closed mesh, above 0 where faces wind counter-clockwise as seen from outside. One work-item per DPR_VOLUME_FACES faces.
+/// Six times the volumes of the tetrahedra between a mesh's first position and its faces: their sum is the volume of
+/// a closed mesh, above 0 where faces wind counter-clockwise as seen from outside. One work-item per DPR_VOLUME_FACES
+/// faces.
 /// in   first     uint4                  of the mesh: face, faces, vertex less position, position
 /// in   runs      work-items of the mesh
 /// in   faces     uint4[face]            vertex indices

@@ -35,7 +35,8 @@ inline bool is_finite(const glm::vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// Place of the first number that is not finite; as many as there are where all are. Blocks are compared without a branch.
+/// Place of the first number that is not finite; as many as there are where all are. Blocks are compared without a
+/// branch.
 inline std::size_t first_not_finite(std::span<const float> numbers) {
   constexpr std::size_t k_block = 1024;
   constexpr std::uint32_t k_exponent = 0x7f800000;

@@ -268,8 +268,8 @@ Buffer<cl_float4>& Renderer::Impl::spare_for(const Buffer<cl_float4>& buffer) {
   return spare;
 }
 
-/// Puts elements in the place of an array's. Many go to the device as they are, where they become rows of four floats, while
-/// the host copies them.
+/// Puts elements in the place of an array's. Many go to the device as they are, where they become rows of four floats,
+/// while the host copies them.
 template <class Element>
 void Renderer::Impl::replace(const ArrayRef& at, std::vector<Element>& held,
                              std::span<const Element> elements) {

@@ -14,8 +14,8 @@ namespace dpr {
 
 using glm::dvec3;
 
-/// Reads parts of joined buffers with one wait. Few rows come as they are; of many the device packs the vectors, which go
-/// where they belong.
+/// Reads parts of joined buffers with one wait. Few rows come as they are; of many the device packs the vectors, which
+/// go where they belong.
 class RowReads {
  public:
   explicit RowReads(Renderer::Impl& renderer, Buffer<float>& packed)
