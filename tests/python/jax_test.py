@@ -87,6 +87,18 @@ class JaxTest(unittest.TestCase):
             change = (term(SQUARE + 1e-3 * step) - term(SQUARE - 1e-3 * step)) / 2e-3
             np.testing.assert_allclose((gradient * step).sum(), change, rtol=1e-2, atol=1e-3)
 
+    def test_losses_of_images(self):
+        """Of arrays, lists and NumPy's arrays alike, and traced by jit."""
+        image, target = (random(1, 14, 15, 4, seed=seed) for seed in (1, 2))
+        step = image - target  # along which no difference changes its sign
+        for kind in ("mse", "l1", "silhouette", "robust", "ssim"):
+            def loss(image):
+                return dpr.image_loss(image, target, mask=np.ones((14, 15, 1), np.float32), **{kind: 1})
+            np.testing.assert_allclose(loss(jnp.asarray(image)), loss(image), rtol=1e-4)
+            gradient = jax.jit(jax.grad(loss))(jnp.asarray(image))
+            change = (loss(image + 1e-2 * step) - loss(image - 1e-2 * step)) / 2e-2
+            np.testing.assert_allclose((gradient * step).sum(), change, rtol=2e-2, atol=1e-4)
+
     def test_wrong_arguments(self):
         views, intrinsics = cameras(1)
         with self.assertRaisesRegex(TypeError, "vertices .* got int32, expected float32"):
