@@ -47,6 +47,29 @@ TEST_SUITE("unit") {
     CHECK(found[k_first + k_count].s[0] == -9.0F);
   }
 
+  TEST_CASE("exchange: packed vectors become rows and come back") {
+    const Device device = open_device();
+    Exchange exchange(impl_of(device));
+    constexpr std::size_t k_count = 7, k_first = 2;
+    for (const std::size_t components : {2U, 3U}) {
+      CAPTURE(components);
+      const std::vector<float> floats = random_floats(components * k_count, 4);
+      const Buffer<float> packed(impl_of(device), floats);
+      Buffer<cl_float4> rows(impl_of(device),
+                             std::vector<cl_float4>(k_first + k_count, cl_float4{{-9, -9, -9, -9}}));
+      exchange.unpack(packed, components, k_count, rows, k_first);
+      const std::vector<cl_float4> found = rows.download();
+      CHECK(found[k_first - 1].s[0] == -9.0F);
+      for (std::size_t i = 0; i < k_count; ++i) {
+        for (std::size_t k = 0; k < 4; ++k)
+          CHECK(found[k_first + i].s[k] == (k < components ? floats[components * i + k] : 0.0F));
+      }
+      Buffer<float> again(impl_of(device), floats.size());
+      exchange.pack(rows, k_first, components, k_count, again);
+      CHECK(again.download() == floats);
+    }
+  }
+
   TEST_CASE("exchange: what comes in is finite, what goes out is as it is") {
     const Device device = open_device();
     Exchange exchange(impl_of(device));
