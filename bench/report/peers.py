@@ -373,8 +373,9 @@ def main():
                       if (row["program"], row["workload"]) not in measured]
         place = {(program, name): (i, k) for i, name in enumerate(WORKLOADS) for k, program in enumerate(PROGRAMS)}
         lines.sort(key=lambda line: place[line.split(",")[0], line.split(",")[2]])
-        head = (f"# {machine_of({line.split(',')[0] for line in lines})}. The fastest of the steps, between which the other programs took "
-                "their turns, and the median.")
+        machine = machine_of({line.split(",")[0] for line in lines})
+        head = (f"# {machine}. The fastest of the steps, between which the other programs took their turns, and the "
+                "median.")
         options.output.write_text("\n".join([head, columns, *lines]) + "\n")
 
 

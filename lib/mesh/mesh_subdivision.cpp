@@ -88,11 +88,6 @@ template <typename Vector>
 inline constexpr std::size_t k_channels_of = sizeof(Vector) / sizeof(float);
 
 template <typename Vector>
-std::span<const float> numbers_of(const std::vector<Vector>& vectors) {
-  return {reinterpret_cast<const float*>(vectors.data()), vectors.size() * k_channels_of<Vector>};
-}
-
-template <typename Vector>
 std::vector<Vector> vectors_of(const std::vector<float>& numbers) {
   const auto* const first = reinterpret_cast<const Vector*>(numbers.data());
   return {first, first + numbers.size() / k_channels_of<Vector>};
@@ -101,14 +96,15 @@ std::vector<Vector> vectors_of(const std::vector<float>& numbers) {
 template <typename Vector>
 std::vector<Vector> combined(const Combinations& list, const std::vector<Vector>& values) {
   if (values.empty()) return values;
-  return vectors_of<Vector>(list.combine(numbers_of(values), k_channels_of<Vector>));
+  return vectors_of<Vector>(list.combine(checks::floats_of(std::span(values)), k_channels_of<Vector>));
 }
 
 template <typename Vector>
 std::vector<Vector> pulled_back(const Combinations& list, const std::vector<Vector>& gradient,
                                 std::size_t old_count) {
   if (gradient.empty() || list.of.empty()) return gradient;
-  return vectors_of<Vector>(list.pull_back(numbers_of(gradient), old_count, k_channels_of<Vector>));
+  return vectors_of<Vector>(
+      list.pull_back(checks::floats_of(std::span(gradient)), old_count, k_channels_of<Vector>));
 }
 
 template <typename T>

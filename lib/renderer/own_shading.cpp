@@ -170,9 +170,7 @@ SceneGradient Renderer::samples_backward(std::span<const glm::vec2> grad_barycen
   Impl& m = *impl_;
   m.require_samples("Renderer::samples_backward");
   const std::size_t count = m.views.size() * m.frame.width * m.frame.height;
-  require_numbers(
-      std::span(reinterpret_cast<const float*>(grad_barycentrics.data()), 2 * grad_barycentrics.size()),
-      2 * count, "grad_barycentrics");
+  require_numbers(checks::floats_of(grad_barycentrics), 2 * count, "grad_barycentrics");
   require_numbers(grad_depths, count, "grad_depths");
   std::vector<cl_float4> places(count);
   for (std::size_t i = 0; i < count; ++i)

@@ -5,7 +5,6 @@
 #include <functional>
 #include <memory>
 
-#include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "scene/light_table.hpp"
 #include "scene/projection_slopes.hpp"
@@ -33,18 +32,15 @@ class RowReads {
     arrivals_.emplace_back([rows, &out] {
       out.reserve(rows.size());
       for (const cl_float4& v : rows) out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
-      return is_finite(out);
     });
     used_ += count;
   }
 
-  /// Returns whether all rows are finite.
-  bool finish() {
+  void finish() {
     reads_.finish();
-    for (const std::function<bool()>& take : arrivals_) are_finite_ = take() && are_finite_;
+    for (const std::function<void()>& take : arrivals_) take();
     arrivals_.clear();
     used_ = 0;
-    return are_finite_;
   }
 
  private:
@@ -56,13 +52,6 @@ class RowReads {
     packed_.resize(impl_of(renderer_.device), k_components * count);
     renderer_.made_exchange().pack(buffer, first, k_components, count, packed_);
     packed_.download({&out.front().x, k_components * count}, 0, reads_);
-    arrivals_.emplace_back([&out] { return is_finite(out); });
-  }
-
-  template <class Vector>
-  static bool is_finite(const std::vector<Vector>& vectors) {
-    const std::span<const float> numbers = checks::floats_of(std::span(vectors));
-    return checks::first_not_finite(numbers) == numbers.size();
   }
 
   Renderer::Impl& renderer_;
@@ -70,8 +59,7 @@ class RowReads {
   std::unique_ptr<cl_float4[]> rows_ = std::make_unique_for_overwrite<cl_float4[]>(k_rows_of_piece);
   PendingReads reads_;  // destroyed first, since reads write to the rows
   std::size_t used_ = 0;
-  bool are_finite_ = true;
-  std::vector<std::function<bool()>> arrivals_;
+  std::vector<std::function<void()>> arrivals_;
 };
 
 bool Renderer::Impl::wants(ArrayId id) const {
@@ -105,9 +93,9 @@ SceneGradient Renderer::Impl::read_gradient() {
   RowReads reads(*this, packed_);
   reads.add(gradient_sums_, sums);
   read_mesh_gradients(by_mesh, reads);
-  const bool has_finite_rows = reads.finish();
+  reads.finish();
   SceneGradient gradient = finish_summed_gradients(sums, std::move(by_mesh));
-  require_finite(gradient, has_finite_rows);
+  require_finite(gradient);
   return gradient;
 }
 

@@ -268,24 +268,23 @@ SceneGradient sum_of(std::vector<SceneGradient>&& parts) {
   return sum.finish();
 }
 
-void require_finite(SceneGradient& gradient, bool has_finite_vectors) {
-  for_each_array(gradient, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
-    std::size_t count = 0;
-    const auto check = [&](double value) {
-      if (!std::isfinite(value)) {
-        const std::string name = name_of(row, index);
-        const std::size_t components = std::holds_alternative<std::vector<glm::vec3>*>(array)   ? 3
-                                       : std::holds_alternative<std::vector<glm::vec2>*>(array) ? 2
-                                                                                                : 0;
-        refuse_gradient(components > 0 ? checks::element(name, count / components) : name, value);
-      }
-      ++count;
-      return value;
+void require_finite(SceneGradient& gradient) {
+  for_each_array(gradient, [](const GradientRow& row, GradientIndex index, const GradientArray& array) {
+    const auto check_vectors = [&]<class Vector>(std::span<const Vector> vectors) {  // millions, perhaps
+      const std::span<const float> numbers = checks::floats_of(vectors);
+      const std::size_t place = checks::first_not_finite(numbers);
+      if (place == numbers.size()) return;
+      const std::size_t element = place / static_cast<std::size_t>(Vector::length());
+      refuse_gradient(checks::element(name_of(row, index), element), static_cast<double>(numbers[place]));
     };
-    const bool is_known = has_finite_vectors &&
-                          (row.of == GradientOf::mesh || row.of == GradientOf::all_views) &&
-                          row.wanted != &Request::materials;
-    if (!is_known) transform_numbers(array, check);
+    if (const auto* of_three = std::get_if<std::vector<glm::vec3>*>(&array))
+      return check_vectors(std::span<const glm::vec3>(**of_three));
+    if (const auto* of_two = std::get_if<std::vector<glm::vec2>*>(&array))
+      return check_vectors(std::span<const glm::vec2>(**of_two));
+    transform_numbers(array, [&](double value) {
+      if (!std::isfinite(value)) refuse_gradient(name_of(row, index), value);
+      return value;
+    });
   });
 }
 

@@ -113,7 +113,7 @@ void transform_numbers(SceneGradient& gradient, F&& f) {
 /// after the other. A single chunk's is that chunk's. At least one.
 SceneGradient sum_of(std::vector<SceneGradient>&& chunks);
 
-/// Throws InvalidArgument that names the first gradient that is not finite. `has_finite_vectors`: those of vectors are.
-void require_finite(SceneGradient& gradient, bool has_finite_vectors = false);
+/// Throws InvalidArgument that names the first gradient that is not finite.
+void require_finite(SceneGradient& gradient);
 
 }  // namespace dpr

@@ -11,25 +11,27 @@ namespace devices_command_test {
 using namespace dpr::test;
 
 TEST_SUITE("pipeline") {
-  // On single lanes the tests gpu_of_groups_of_... check them.
-  TEST_CASE("devices --check: every stage agrees with the reference, on vectors") {
+  TEST_CASE("devices --check: every stage agrees with the reference, on vectors and on single lanes") {
     if (is_skipped()) return;
     const TempDir folder;
-    const Outcome outcome =
-        run_command(folder, {"devices", "--check", "--json", "--device", "cpu"}, "DPR_LANES=16");
-    CAPTURE(outcome.out);
-    REQUIRE(outcome.status == 0);
-    const nlohmann::json devices = nlohmann::json::parse(outcome.out);
-    REQUIRE(devices.size() == 1);
-    CHECK(devices[0]["lanes"] == 16);
-    const nlohmann::json& check = devices[0]["check"];
-    CHECK(check["failed"] == 0);
-    CHECK(check["comparisons"] == check["rows"].size());
-    CHECK(check["rows"].size() > 40);
-    for (const nlohmann::json& row : check["rows"]) {
-      CAPTURE(row["stage"].get<std::string>());
-      CHECK(row["passed"] == true);
-      CHECK(row["worst"].get<double>() <= row["bound"].get<double>());
+    for (const std::string lanes : {"1", "16"}) {
+      CAPTURE(lanes);
+      const Outcome outcome =
+          run_command(folder, {"devices", "--check", "--json", "--device", "cpu"}, "DPR_LANES=" + lanes);
+      CAPTURE(outcome.out);
+      REQUIRE(outcome.status == 0);
+      const nlohmann::json devices = nlohmann::json::parse(outcome.out);
+      REQUIRE(devices.size() == 1);
+      CHECK(std::to_string(devices[0]["lanes"].get<int>()) == lanes);
+      const nlohmann::json& check = devices[0]["check"];
+      CHECK(check["failed"] == 0);
+      CHECK(check["comparisons"] == check["rows"].size());
+      CHECK(check["rows"].size() > 40);
+      for (const nlohmann::json& row : check["rows"]) {
+        CAPTURE(row["stage"].get<std::string>());
+        CHECK(row["passed"] == true);
+        CHECK(row["worst"].get<double>() <= row["bound"].get<double>());
+      }
     }
   }
 
