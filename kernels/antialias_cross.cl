@@ -18,16 +18,19 @@
 #include "nearest.h"
 #include "visibility.h"
 
-/// The front-most fragment of samples near contours, its depth INFINITY where there is none. One work-item
-/// per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), p.last_tile). Deterministic.
+/// What hides contours from samples near them: the front-most surface or, where `layers` are told apart, the
+/// last of these, since what lies before it may be seen through. One work-item per DPR_ROWS of a tile of the
+/// band, whose tiles are [get_global_offset(), p.last_tile). Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   starts       uint[pixel + 1]        runs of `list`
 /// in   list         uint[...]              fragments, by pixel
 /// in   depth        float[fragment]        view depth
 /// in   fragment_pair, pair_face            uint[fragment], uint[pair]
-/// out  front        float[pixel]           not written in tiles further than one from a contour
-/// out  front_face   uint[pixel]            the same; view * faces + face, DPR_NO_FACE where there is none
-kernel void antialias_front(const FrameParams p, global const uint* restrict tile_starts,
+/// out  front        float[pixel]           not written in tiles further than one from a contour. INFINITY
+///                                          where there are fewer surfaces
+/// out  front_face   uint[pixel]            the same, of what surfaces there are; view * faces + face,
+///                                          DPR_NO_FACE where there is none
+kernel void antialias_front(const FrameParams p, const uint layers, global const uint* restrict tile_starts,
                             global const uint* restrict starts, global const uint* restrict list,
                             global const float* restrict depth, global const uint* restrict fragment_pair,
                             global const uint* restrict pair_face, global float* restrict front,
@@ -37,9 +40,14 @@ kernel void antialias_front(const FrameParams p, global const uint* restrict til
   for (uint row = rows.first; row < rows.last; ++row) {
     const uint first = place_of_sample(p, rows.view, rows.first_column, row);
     for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
-      const uint fragment = nearest_fragment(pixel, starts, list, depth);
-      front[pixel] = fragment == DPR_NO_FACE ? INFINITY : depth[fragment];
-      front_face[pixel] = fragment == DPR_NO_FACE ? DPR_NO_FACE : pair_face[fragment_pair[fragment]];
+      DepthLayer surface = before_surfaces();
+      uint face = DPR_NO_FACE;
+      for (uint layer = 0; layer < layers && is_surface(surface); ++layer) {
+        surface = next_behind(surface, pixel, starts, list, depth);
+        if (is_surface(surface)) face = pair_face[fragment_pair[list[surface.place]]];
+      }
+      front[pixel] = surface.depth;
+      front_face[pixel] = face;
     }
   }
 }

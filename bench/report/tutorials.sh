@@ -2,7 +2,7 @@
 # Draws the pictures of include/examples by running the tutorials in full. From the repository's root, after
 # `cmake --build --preset release`; the tutorials in PyTorch need a python3 that has torch.
 #
-#   bench/report/tutorials.sh [TUTORIAL...]    pose mesh texture shading materials light unless given
+#   bench/report/tutorials.sh [TUTORIAL...]    pose mesh texture shading materials glass light unless given
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -32,12 +32,12 @@ plot $(IFS=,; echo "${plots[*]}")
 END
 }
 
-(($#)) || set -- pose mesh texture shading materials light
+(($#)) || set -- pose mesh texture shading materials glass light
 for name in "$@"; do
   program=build/release/bin/dpr_document_tutorial_$name
   options=()
   [[ -x $program ]] && options+=(--program "$program")
-  [[ $name == shading || $name == materials ]] && options+=(--python "$(command -v python3)")
+  [[ $name == shading || $name == materials || $name == glass ]] && options+=(--python "$(command -v python3)")
   python3 tests/documents/blocks.py run "include/examples/$name.md" --source . --build build/release \
     --work "$work/$name" --full "${options[@]}"
   cd "$work/$name"
@@ -47,6 +47,7 @@ for name in "$@"; do
     mesh) draw mesh 1 782 96 fit/targets.png "eight of the views" fit/results.png "the mesh found, from the same sides" ;;
     texture) draw texture 4 160 160 truth.png "the picture" step0.png "step 0" step10.png "step 10" step60.png "step 60" ;;
     shading) draw shading 3 160 160 truth.png "the picture" start.png "the first guess" found.png "found" ;;
+    glass) draw glass 3 160 160 truth.png "the picture" start.png "the first guess" found.png "found" ;;
     materials) draw materials 3 160 160 truth.png "the picture" start.png "the first guess" found.png "found" ;;
     light) draw light 2 160 160 spot.png "the spot" change.png "as its cone grows" ;;
   esac

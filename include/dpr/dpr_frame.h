@@ -85,7 +85,8 @@ typedef struct dpr_frame_options {
   { sizeof(dpr_frame_options), NULL, 128, 128, NULL, 0, 0, 0, NULL, 0 }
 
 /* "preset, sigma, ...": the keys of "smoothing" in the scene format; "znear", "zfar" and "cull"; "shading"
- * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp". */
+ * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp"; "layers" of
+ * samples, 1 to 256. */
 DPR_API const char* dpr_frame_settings(void);
 /* Refuses size and settings that cannot be rendered with, and settings that the smoothing does not use, such
  * as "sigma" of the preset "rigid". Opens no device. */
@@ -114,16 +115,18 @@ DPR_API dpr_status dpr_frame_tangent(dpr_frame* frame, size_t directions, const 
 
 /* Shading of the caller's own, with noise on the pixel (preset "pixel") around it: what the samples of the rigid image
  * show, and images of the values that the caller finds for them. Of frames without lights; colours and textures have no
- * part in it, and of surfaces the nearest alone counts. The samples of a view are a raster from the top left,
- * `supersampling` a pixel and axis, with a margin around the image. */
+ * part in it. The samples of a view are a raster from the top left, `supersampling` a pixel and axis, with a margin
+ * around the image. They show the nearest surface alone, or by the setting "layers=L" the nearest L, for values that
+ * blend these as see-through: contours count then unless L surfaces hide them. */
 typedef struct dpr_raster {
   int width, height, supersampling, margin; /* samples */
+  int layers;
 } dpr_raster;
 
 DPR_API dpr_status dpr_frame_raster(dpr_frame* frame, dpr_raster* raster);
-/* Fills those that are named: DPR_INT64 "face_id" [N, h, w], -1 where nothing is; "barycentrics" [N, h, w, 3], of the
- * face's corners, and "depth" [N, h, w] along the view direction, world units, both 0 where nothing is. Waits for the
- * device. */
+/* Fills those that are named: DPR_INT64 "face_id" [L N, h, w], -1 where nothing is; "barycentrics" [L N, h, w, 3], of
+ * the face's corners, and "depth" [L N, h, w] along the view direction, world units, both 0 where nothing is. The N
+ * views of the nearest layer come first. Waits for the device. */
 DPR_API dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples, size_t count);
 /* The gradients of sum <grads, samples>, of "barycentrics" and "depth", into `gradients` as dpr_frame_backward() has
  * them: of vertices, views and intrinsics. Where samples jump from face to face dpr_frame_resolve_backward() has the
@@ -138,6 +141,16 @@ DPR_API dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, 
 DPR_API dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values,
                                               const dpr_array* grad_images, const dpr_array* grad_values,
                                               const dpr_array* gradients, size_t gradient_count);
+/* Forward mode of dpr_frame_samples(), along directions as dpr_frame_tangent() takes them: "barycentrics"
+ * [directions L N, h, w, 3] and "depth" [directions L N, h, w]. */
+DPR_API dpr_status dpr_frame_samples_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
+                                             size_t tangent_count, const dpr_array* samples,
+                                             size_t sample_count);
+/* Forward mode of dpr_frame_resolve(), along directions in which values change by value_tangents
+ * [directions N, h, w, C] as well: images [directions N, height, width, C]. */
+DPR_API dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
+                                             size_t tangent_count, const dpr_array* values,
+                                             const dpr_array* value_tangents, const dpr_array* images);
 /* Not 0: no triangle of any view was rendered. */
 DPR_API dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty);
 DPR_API void dpr_frame_destroy(dpr_frame* frame);

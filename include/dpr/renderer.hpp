@@ -149,15 +149,18 @@ class ArraySetters {
 };
 
 /// What the rigid image's samples show, for shading of the caller's own: a raster of `supersampling` samples a pixel
-/// and axis, with a margin of samples around the image, from the top left.
+/// and axis, with a margin of samples around the image, from the top left. Layer 0 is each sample's nearest surface,
+/// layer 1 the next behind it, and so on.
 struct Samples {
   int width = 0, height = 0;  ///< samples of a view
   int supersampling = 1, margin = 0;
-  std::vector<std::int32_t>
-      faces;  ///< [view][height][width] of the scene, the meshes' one after the other; -1: none
-  std::vector<vec2> barycentrics;  ///< [view][height][width] of the face's corners 1 and 2; 0 without a face
-  std::vector<float>
-      depths;  ///< [view][height][width] along the view direction, world units; 0 without a face
+  int layers = 1;
+  /// [layer][view][height][width] of the scene, the meshes' one after the other; -1: none
+  std::vector<std::int32_t> faces;
+  /// [layer][view][height][width] of the face's corners 1 and 2; 0 without a face
+  std::vector<vec2> barycentrics;
+  /// [layer][view][height][width] along the view direction, world units; 0 without a face
+  std::vector<float> depths;
 };
 
 class ImageLoss;
@@ -167,6 +170,12 @@ class MeshLoss;
 struct ResolveGradient {
   std::vector<float> samples;
   SceneGradient scene;
+};
+
+/// Derivatives of Samples along directions.
+struct SamplesTangent {
+  std::vector<vec2> barycentrics;  ///< [direction][layer][view][height][width]; 0 without a face
+  std::vector<float> depths;       ///< the same
 };
 
 /// Renders one scene again and again. Buffers are kept from frame to frame. Not thread-safe; movable.
@@ -246,8 +255,13 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// buffer.
   std::vector<Image> tangent(std::span<const SceneTangent> directions);
 
+  /// How many of each sample's surfaces samples() tells apart, from the nearest on: 1 unless set, at most 256. With
+  /// more than one, whoever shades them may blend them as see-through: frames keep what lies behind other surfaces,
+  /// faces on the far side of closed meshes too, and resolve() follows every contour that fewer than `count` surfaces
+  /// hide. The library's own images take longer then, and differ as set_shapes() says. Throws InvalidArgument.
+  void set_layers(int count);
   /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or
-  /// textures, which have no part in it. The nearest surface alone counts, whatever gamma is. Blocks. Throws as image()
+  /// textures, which have no part in it. The nearest surfaces alone count, whatever gamma is. Blocks. Throws as image()
   /// does, and InvalidArgument without noise on the pixel.
   Samples samples();
   /// Gradients of <grad_barycentrics, barycentrics> + <grad_depths, depths> by positions, transforms and cameras, as
@@ -263,6 +277,16 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// positions, transforms and cameras.
   ResolveGradient resolve_backward(std::span<const float> samples, std::size_t channels,
                                    std::span<const float> grad_pixels);
+  /// Forward mode of samples(): how what they show changes along directions, as tangent() takes them, of which
+  /// positions, transforms and cameras count. Blocks. Throws as samples() and tangent() do.
+  SamplesTangent samples_tangent(std::span<const SceneTangent> directions);
+  /// Forward mode of resolve(): the derivatives of its images along directions in which the samples change by
+  /// `sample_tangents`, [direction] of their numbers. [direction][view][height][width][channel], by way of the samples
+  /// and of the contours. The transpose of resolve_backward(), up to rounding. Blocks. Throws as resolve() and tangent()
+  /// do.
+  std::vector<float> resolve_tangent(std::span<const float> samples, std::size_t channels,
+                                     std::span<const float> sample_tangents,
+                                     std::span<const SceneTangent> directions);
 
   /// Statistics of the last forward(). Throws as image() does.
   RenderStatistics statistics() const;

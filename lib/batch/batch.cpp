@@ -121,6 +121,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
   Renderer& renderer = frame_.renderer();
   upload_settings(renderer, views, lights, settings.smoothing(), options.first_view);
   renderer.set_cull(settings.cull());
+  renderer.set_layers(settings.layers());
   const NamedArray* const background = find(arrays, "background");
   renderer.set_background(background ? background->rows<const glm::vec3>()[0] : glm::vec3(0.0F));
   upload_surface(renderer, arrays);
@@ -286,11 +287,6 @@ dpr_frame_options to_options(const dpr_frame_options* options) {
 
 using namespace dpr::c;
 
-struct dpr_frame {
-  static constexpr const char* k_handle = "dpr_frame";
-  std::unique_ptr<dpr::batch::Batch> batch;
-};
-
 const char* dpr_frame_settings() {
   static const std::string names = [] {
     std::string all;
@@ -344,44 +340,6 @@ dpr_status dpr_frame_tangent(dpr_frame* frame, std::size_t directions, const dpr
                                  "at least 1, with images in memory");
     batch.tangent(directions, dpr::batch::to_arrays(tangents, tangent_count, "tangents"),
                   to_pixels(pixels, pixel_count, directions * floats));
-  });
-}
-
-dpr_status dpr_frame_raster(dpr_frame* frame, dpr_raster* raster) {
-  return guarded([&] { deref(raster, "raster") = deref(frame, "frame").batch->raster(); });
-}
-
-dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples, std::size_t count) {
-  return guarded(
-      [&] { deref(frame, "frame").batch->read_samples(dpr::batch::to_arrays(samples, count, "samples")); });
-}
-
-dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, std::size_t grad_count,
-                                      const dpr_array* gradients, std::size_t gradient_count) {
-  return guarded([&] {
-    deref(frame, "frame")
-        .batch->samples_backward(dpr::batch::to_arrays(grads, grad_count, "grads"),
-                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
-  });
-}
-
-dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images) {
-  return guarded([&] {
-    deref(frame, "frame")
-        .batch->resolve(dpr::batch::to_arrays(values, 1, "values")[0],
-                        dpr::batch::to_arrays(images, 1, "images")[0]);
-  });
-}
-
-dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values, const dpr_array* grad_images,
-                                      const dpr_array* grad_values, const dpr_array* gradients,
-                                      std::size_t gradient_count) {
-  return guarded([&] {
-    deref(frame, "frame")
-        .batch->resolve_backward(dpr::batch::to_arrays(values, 1, "values")[0],
-                                 dpr::batch::to_arrays(grad_images, 1, "grad_images")[0],
-                                 dpr::batch::to_arrays(grad_values, 1, "grad_values")[0],
-                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
   });
 }
 

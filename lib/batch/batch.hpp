@@ -52,6 +52,9 @@ class Batch {
   void resolve(const NamedArray& values, const NamedArray& images);
   void resolve_backward(const NamedArray& values, const NamedArray& grad_images,
                         const NamedArray& grad_values, NamedArrays gradients);
+  void samples_tangent(std::size_t directions, NamedArrays tangents, NamedArrays samples);
+  void resolve_tangent(std::size_t directions, NamedArrays tangents, const NamedArray& values,
+                       const NamedArray& value_tangents, const NamedArray& images);
   /// Numbers of all images.
   std::size_t image_floats();
   /// True if no triangle of any view was rendered.
@@ -63,13 +66,19 @@ class Batch {
   void require_image(const NamedArray& array, std::size_t channels);
   /// Throws InvalidArgument for gradients that backward passes were not announced for; all others become 0.
   void start_gradients(NamedArrays gradients);
-  /// Throws InvalidArgument unless an array is floats by sample or pixel, of the same channels as `like` where given.
-  void require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like);
+  /// Throws InvalidArgument unless an array is floats by sample or pixel, of the same channels as `like` where given;
+  /// of so many directions, one after the other.
+  void require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like,
+                      std::size_t directions = 1);
+  /// The same of what samples show, by its name.
+  void require_samples(const NamedArray& array, std::size_t directions);
   /// `is_affine`: whether the gradients of the views' matrices are those of any affine ones, which come from
   /// those of every view's vertices, where nothing else depends on the views. Lights, and what is measured in
   /// world space, stay where they are: with them the gradients are those of rigid motions.
   void add_gradients(SceneGradient& found, bool is_affine, NamedArrays gradients);
   void add_gradient(SceneGradient& found, bool is_affine, const NamedArray& gradient);
+  /// Directions in which the arrays move as their tangents say.
+  std::vector<SceneTangent> moving(std::size_t directions, NamedArrays tangents);
   /// A direction in which nothing moves, with room for what these arrays move.
   SceneTangent resting(NamedArrays tangents);
   /// Adds the motion of an array's numbers to a direction.
@@ -81,3 +90,8 @@ class Batch {
 };
 
 }  // namespace dpr::batch
+
+struct dpr_frame {
+  static constexpr const char* k_handle = "dpr_frame";
+  std::unique_ptr<dpr::batch::Batch> batch;
+};

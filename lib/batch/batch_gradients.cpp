@@ -219,17 +219,21 @@ void Batch::add_tangent(const NamedArray& tangent, std::span<const float> number
   if (tangent.name != "vertices" || count != numbers.size() * views.size()) require_count(count);
 }
 
-void Batch::tangent(std::size_t directions, NamedArrays tangents, std::span<glm::vec4> images) {
+std::vector<SceneTangent> Batch::moving(std::size_t directions, NamedArrays tangents) {
   for (const NamedArray& tangent : tangents) require_tangent(tangent, directions, wanted_);
-  Renderer& renderer = frame_.renderer();
   std::vector<SceneTangent> moved(directions, resting(tangents));
   for (const NamedArray& tangent : tangents) {
     const std::size_t count = tangent.count() / directions;
     for (std::size_t d = 0; d < directions; ++d)
       add_tangent(tangent, tangent.rows<const float>().subspan(d * count, count), moved[d]);
   }
+  return moved;
+}
+
+void Batch::tangent(std::size_t directions, NamedArrays tangents, std::span<glm::vec4> images) {
   glm::vec4* next = images.data();
-  for (const Image& image : renderer.tangent(moved)) next = std::ranges::copy(image.pixels, next).out;
+  for (const Image& image : frame_.renderer().tangent(moving(directions, tangents)))
+    next = std::ranges::copy(image.pixels, next).out;
 }
 
 }  // namespace dpr::batch

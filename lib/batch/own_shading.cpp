@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "batch/batch.hpp"
+#include "batch/inputs.hpp"
+#include "c/handles.hpp"
 #include "dpr/error.hpp"
 #include "renderer/renderer_impl.hpp"
 
@@ -18,39 +20,52 @@ void require_one_of(const NamedArray& array, std::initializer_list<std::string_v
     throw InvalidArgument("samples (batch)", "'" + array.name + "'", expected);
 }
 
+void require_directions(std::size_t directions) {
+  constexpr std::size_t k_most = 1U << 16U;  // so that numbers of their arrays can be counted
+  if (directions == 0 || directions > k_most)
+    throw InvalidArgument("directions", std::to_string(directions), "1 to " + std::to_string(k_most));
+}
+
 }  // namespace
 
 dpr_raster Batch::raster() {
   Renderer::Impl& m = impl_of(frame_.renderer());
   m.require_samples("dpr_frame_raster");
   return {static_cast<int>(m.frame.width), static_cast<int>(m.frame.height), m.raster.supersampling,
-          m.raster.margin};
+          m.raster.margin, static_cast<int>(m.layers)};
 }
 
-void Batch::require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like) {
+void Batch::require_values(const NamedArray& array, bool is_by_sample, const NamedArray* like,
+                           std::size_t directions) {
   const Renderer& renderer = frame_.renderer();
   const dpr_raster samples = raster();
   const Scene& scene = renderer.scene();
   const auto height = static_cast<std::size_t>(is_by_sample ? samples.height : scene.height),
              width = static_cast<std::size_t>(is_by_sample ? samples.width : scene.width);
-  const std::size_t views = renderer.views().size(), channels = like ? like->shape.back() : k_any;
+  const std::size_t views = directions * renderer.views().size(),
+                    channels = like ? like->shape.back() : k_any;
   const std::string expected = "[" + std::to_string(views) + ", " + std::to_string(height) + ", " +
                                std::to_string(width) + ", " + (like ? std::to_string(channels) : "C") + "]";
   require_floats(array, {views, height, width, channels}, expected);
   if (array.count() == 0) throw InvalidArgument(argument(array), text_of(array.shape), expected);
 }
 
-void Batch::read_samples(NamedArrays samples) {
+void Batch::require_samples(const NamedArray& array, std::size_t directions) {
   const dpr_raster size = raster();
-  const std::size_t views = frame_.renderer().views().size(), height = static_cast<std::size_t>(size.height),
-                    width = static_cast<std::size_t>(size.width);
+  const std::size_t rows =
+      directions * static_cast<std::size_t>(size.layers) * frame_.renderer().views().size();
+  const auto height = static_cast<std::size_t>(size.height), width = static_cast<std::size_t>(size.width);
   const std::string form =
-      "[" + std::to_string(views) + ", " + std::to_string(height) + ", " + std::to_string(width);
+      "[" + std::to_string(rows) + ", " + std::to_string(height) + ", " + std::to_string(width);
+  if (array.name == "face_id") require_form(array, Element::int64, {{rows, height, width}}, form + "]");
+  if (array.name == "barycentrics") require_floats(array, {rows, height, width, k_corners}, form + ", 3]");
+  if (array.name == "depth") require_floats(array, {rows, height, width}, form + "]");
+}
+
+void Batch::read_samples(NamedArrays samples) {
   for (const NamedArray& array : samples) {
     require_one_of(array, {"face_id", "barycentrics", "depth"}, "face_id, barycentrics or depth");
-    if (array.name == "face_id") require_form(array, Element::int64, {{views, height, width}}, form + "]");
-    if (array.name == "barycentrics") require_floats(array, {views, height, width, k_corners}, form + ", 3]");
-    if (array.name == "depth") require_floats(array, {views, height, width}, form + "]");
+    require_samples(array, 1);
   }
   const Samples found = frame_.renderer().samples();
   for (const NamedArray& array : samples) {
@@ -65,12 +80,29 @@ void Batch::read_samples(NamedArrays samples) {
   }
 }
 
+void Batch::samples_tangent(std::size_t directions, NamedArrays tangents, NamedArrays samples) {
+  require_directions(directions);
+  for (const NamedArray& array : samples) {
+    require_one_of(array, {"barycentrics", "depth"}, "barycentrics or depth: the others have no tangents");
+    require_samples(array, directions);
+  }
+  const SamplesTangent found = frame_.renderer().samples_tangent(moving(directions, tangents));
+  for (const NamedArray& array : samples) {
+    if (array.name == "depth") {
+      std::ranges::copy(found.depths, array.rows<float>().begin());
+    } else {
+      std::ranges::transform(found.barycentrics, array.rows<glm::vec3>().begin(),
+                             [](const glm::vec2& b) { return glm::vec3(-b.x - b.y, b.x, b.y); });
+    }
+  }
+}
+
 void Batch::samples_backward(NamedArrays grads, NamedArrays gradients) {
   Renderer& renderer = frame_.renderer();
   start_gradients(gradients);
   const dpr_raster size = raster();
-  const std::size_t count =
-      renderer.views().size() * static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
+  const std::size_t count = static_cast<std::size_t>(size.layers) * renderer.views().size() *
+                            static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
   std::vector<glm::vec2> barycentrics(count);
   std::vector<float> depths(count);
   for (const NamedArray& grad : grads) {
@@ -115,4 +147,78 @@ void Batch::resolve_backward(const NamedArray& values, const NamedArray& grad_im
   add_gradients(found.scene, true, gradients);
 }
 
+void Batch::resolve_tangent(std::size_t directions, NamedArrays tangents, const NamedArray& values,
+                            const NamedArray& value_tangents, const NamedArray& images) {
+  require_directions(directions);
+  require_values(values, true, nullptr);
+  require_values(value_tangents, true, &values, directions);
+  require_values(images, false, &values, directions);
+  const std::vector<float> pixels =
+      frame_.renderer().resolve_tangent(values.rows<const float>(), values.shape.back(),
+                                        value_tangents.rows<const float>(), moving(directions, tangents));
+  std::ranges::copy(pixels, images.rows<float>().begin());
+}
+
 }  // namespace dpr::batch
+
+using namespace dpr::c;
+
+dpr_status dpr_frame_raster(dpr_frame* frame, dpr_raster* raster) {
+  return guarded([&] { deref(raster, "raster") = deref(frame, "frame").batch->raster(); });
+}
+
+dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples, std::size_t count) {
+  return guarded(
+      [&] { deref(frame, "frame").batch->read_samples(dpr::batch::to_arrays(samples, count, "samples")); });
+}
+
+dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, std::size_t grad_count,
+                                      const dpr_array* gradients, std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->samples_backward(dpr::batch::to_arrays(grads, grad_count, "grads"),
+                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
+dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->resolve(dpr::batch::to_arrays(values, 1, "values")[0],
+                        dpr::batch::to_arrays(images, 1, "images")[0]);
+  });
+}
+
+dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values, const dpr_array* grad_images,
+                                      const dpr_array* grad_values, const dpr_array* gradients,
+                                      std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->resolve_backward(dpr::batch::to_arrays(values, 1, "values")[0],
+                                 dpr::batch::to_arrays(grad_images, 1, "grad_images")[0],
+                                 dpr::batch::to_arrays(grad_values, 1, "grad_values")[0],
+                                 dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
+dpr_status dpr_frame_samples_tangent(dpr_frame* frame, std::size_t directions, const dpr_array* tangents,
+                                     std::size_t tangent_count, const dpr_array* samples,
+                                     std::size_t sample_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->samples_tangent(directions, dpr::batch::to_arrays(tangents, tangent_count, "tangents"),
+                                dpr::batch::to_arrays(samples, sample_count, "samples"));
+  });
+}
+
+dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, std::size_t directions, const dpr_array* tangents,
+                                     std::size_t tangent_count, const dpr_array* values,
+                                     const dpr_array* value_tangents, const dpr_array* images) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->resolve_tangent(directions, dpr::batch::to_arrays(tangents, tangent_count, "tangents"),
+                                dpr::batch::to_arrays(values, 1, "values")[0],
+                                dpr::batch::to_arrays(value_tangents, 1, "value_tangents")[0],
+                                dpr::batch::to_arrays(images, 1, "images")[0]);
+  });
+}

@@ -49,6 +49,14 @@ Cull cull_value(const OptionValue& value) {
   return parse_cull(*word, k_where);
 }
 
+int layers_of(const OptionValue& value) {
+  constexpr int k_most = 256;  // as Renderer::set_layers() takes them
+  const auto* const count = std::get_if<std::int64_t>(&value);
+  if (count && *count >= 1 && *count <= k_most) return static_cast<int>(*count);
+  throw InvalidArgument("layers (batch)", count ? std::to_string(*count) : "no whole number",
+                        "1 to " + std::to_string(k_most));
+}
+
 /// The modes that a list of words, "repeat,clamp", has.
 template <typename Mode, std::size_t count>
 std::vector<Mode> modes_of(const OptionValue& value, const std::array<std::string_view, count>& names,
@@ -102,7 +110,7 @@ float power_of_two_below(double value) { return static_cast<float>(std::exp2(std
 
 std::vector<std::string_view> setting_names() {
   std::vector<std::string_view> names = option_keys();
-  names.insert(names.end(), {"znear", "zfar", "cull", "shading", "shininess", "wrap", "filter"});
+  names.insert(names.end(), {"znear", "zfar", "cull", "shading", "shininess", "wrap", "filter", "layers"});
   return names;
 }
 
@@ -125,6 +133,8 @@ void RenderSettings::set(const std::string& name, const OptionValue& value) {
     validate(changed.lights_);
   } else if (name == "cull") {
     changed.cull_ = cull_value(value);
+  } else if (name == "layers") {
+    changed.layers_ = layers_of(value);
   } else if (name == "wrap") {
     changed.wraps_ = modes_of<Wrap>(value, k_wrap_names, name);
   } else if (name == "filter") {

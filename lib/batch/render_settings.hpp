@@ -17,7 +17,7 @@
 
 namespace dpr::batch {
 
-/// Size, smoothing, clipping, culling and shading. Errors are the library's.
+/// Size, smoothing, clipping, culling, shading and layers. Errors are the library's.
 class RenderSettings {
  public:
   RenderSettings(std::int64_t width, std::int64_t height);
@@ -35,6 +35,7 @@ class RenderSettings {
   int width() const { return width_; }
   int height() const { return height_; }
   const Smoothing& smoothing() const { return smoothing_; }
+  int layers() const { return layers_; }
   Cull cull() const { return cull_; }
   /// Shading of the lights, without their numbers.
   const Lights& lights() const { return lights_; }
@@ -56,12 +57,13 @@ class RenderSettings {
   std::optional<float> znear_, zfar_;
   Lights lights_;
   Cull cull_ = Cull::none;
+  int layers_ = 1;
   std::vector<Wrap> wraps_;
   std::vector<Filter> filters_;
 };
 
 /// The keys of a scene's "smoothing"; "znear", "zfar" and "cull"; "shading" and "shininess" of lights; "wrap"
-/// and "filter" of textures.
+/// and "filter" of textures; "layers" of samples.
 std::vector<std::string_view> setting_names();
 
 /// Sets by "sigma=1e-3": a whole number, a number, or else a word.

@@ -49,6 +49,7 @@ void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
   require_whole();
   if (!aov) aov.emplace(impl_of(device));
+  if (pixel_noise) see_layers(1);
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);

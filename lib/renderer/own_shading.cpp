@@ -41,6 +41,14 @@ FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_
   return {packed.cl_buffer()(), first, channels, std::min<std::size_t>(channels - first, 4)};
 }
 
+/// Groups of a list, each of so many at most: function(group, index of its first).
+template <class Function>
+void for_each_group(std::span<const SceneTangent> directions, std::size_t together,
+                    const Function& function) {
+  for (std::size_t first = 0; first < directions.size(); first += together)
+    function(directions.subspan(first, std::min(together, directions.size() - first)), first);
+}
+
 }  // namespace
 
 void Renderer::Impl::require_samples(const char* caller) {
@@ -58,8 +66,19 @@ void Renderer::Impl::find_samples() {
   if (!surface_samples) surface_samples.emplace(impl_of(device));
   for (const Band& band : bands) {
     if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
-    surface_samples->forward(frame, bin, rasterize);
+    surface_samples->forward(frame, bin, rasterize, layers);
   }
+}
+
+/// Finds the contours' crossings again, as they are seen through all but the last of so many layers.
+void Renderer::Impl::see_layers(cl_uint count) {
+  if (count == seen_layers_) return;
+  for (const Band& band : bands) {
+    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+    pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, count);
+  }
+  pixel_noise->antialias.cross(contour_inputs(), pixel_noise->contour);
+  seen_layers_ = count;
 }
 
 /// From `grad_vertices` and, of clipped faces, `clip.grad` to the host's.
@@ -76,7 +95,7 @@ SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_p
   if (!surface_samples) surface_samples.emplace(impl_of(device));
   for (const Band& band : bands) {
     if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
-    surface_samples->backward(frame, own_group_, rasterize);
+    surface_samples->backward(frame, own_group_, layers, rasterize);
     rasterize.backward(frame, setup.triangles, bin);
   }
   gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
@@ -91,6 +110,7 @@ SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_p
 }
 
 void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels) {
+  see_layers(layers);
   Device::Impl& on = impl_of(device);
   own_samples_.upload(on, samples);
   own_pixels_.resize(on, pixels.size());
@@ -107,6 +127,7 @@ void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channel
 
 ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples, std::size_t channels,
                                                  std::span<const float> grad_pixels) {
+  see_layers(layers);
   const GeometricRequest request(scene.gradients);
   Device::Impl& on = impl_of(device);
   const std::size_t sample_count = samples.size() / channels, pixel_count = grad_pixels.size() / channels;
@@ -145,6 +166,71 @@ ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples,
   return total;
 }
 
+SamplesTangent Renderer::Impl::samples_tangent(std::span<const SceneTangent> directions) {
+  const std::size_t samples = layers * views.size() * frame.width * frame.height;
+  SamplesTangent found;
+  found.barycentrics.reserve(directions.size() * samples);
+  found.depths.reserve(directions.size() * samples);
+  if (!surface_samples) surface_samples.emplace(impl_of(device));
+  const std::size_t together = tangents_together(directions.size());
+  cut_for_tangents(together);
+  for_each_group(directions, together, [&](std::span<const SceneTangent> group, std::size_t first) {
+    start_tangents(group, first);
+    for (const Band& band : bands) {
+      if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+      rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
+      surface_samples->tangent(frame, rasterize, layers, tangents);
+    }
+    for (const cl_float4& place : surface_samples->moved.download()) {
+      found.barycentrics.emplace_back(place.s[0], place.s[1]);
+      found.depths.push_back(place.s[2]);
+    }
+  });
+  return found;
+}
+
+void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t channels,
+                                     std::span<const float> sample_tangents,
+                                     std::span<const SceneTangent> directions, std::span<float> pixels) {
+  see_layers(layers);
+  Device::Impl& on = impl_of(device);
+  const std::size_t sample_count = samples.size() / channels,
+                    of_direction = pixels.size() / directions.size(), pixel_count = of_direction / channels;
+  own_samples_.upload(on, samples);
+  own_group_.resize(on, sample_count);
+  for_each_group(
+      directions, tangents_together(directions.size()), [&](auto group, std::size_t first_direction) {
+        start_tangents(group, first_direction);
+            own_tangents_.upload(
+            on, sample_tangents.subspan(first_direction * samples.size(), group.size() * samples.size()));
+        own_pixels_.resize(on, group.size() * of_direction);
+        for (std::size_t first = 0; first < channels; first += 4) {
+          made_exchange().give(group_of(own_samples_, first, channels), sample_count,
+                               vectors_of(own_group_, 0, 4));
+          pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
+          for (std::size_t d = 0; d < group.size(); ++d) {
+            FloatVectors from = group_of(own_tangents_, first, channels),
+                         to = group_of(own_pixels_, first, channels);
+            from.first += d * samples.size();
+            to.first += d * of_direction;
+            made_exchange().give(from, sample_count, vectors_of(own_group_, 0, 4));
+            pixel_noise->smooth_tangent(contour_inputs(), image_size(), d, tangents, own_group_, own_image_,
+                                        aggregate.scratch(frame));
+            made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
+          }
+        }
+        own_pixels_.download(pixels.subspan(first_direction * of_direction, group.size() * of_direction));
+      });
+}
+
+void Renderer::set_layers(int count) {
+  constexpr int k_most_layers = 256;
+  if (count < 1 || count > k_most_layers)
+    throw InvalidArgument("count (Renderer::set_layers)", std::to_string(count),
+                          "1 to " + std::to_string(k_most_layers));
+  impl_->set_layers(static_cast<cl_uint>(count));
+}
+
 Samples Renderer::samples() {
   Impl& m = *impl_;
   m.require_samples("Renderer::samples");
@@ -153,6 +239,7 @@ Samples Renderer::samples() {
                 static_cast<int>(m.frame.height),
                 m.raster.supersampling,
                 m.raster.margin,
+                static_cast<int>(m.layers),
                 {},
                 {},
                 {}};
@@ -169,7 +256,7 @@ SceneGradient Renderer::samples_backward(std::span<const glm::vec2> grad_barycen
                                          std::span<const float> grad_depths) {
   Impl& m = *impl_;
   m.require_samples("Renderer::samples_backward");
-  const std::size_t count = m.views.size() * m.frame.width * m.frame.height;
+  const std::size_t count = m.layers * m.views.size() * m.frame.width * m.frame.height;
   require_numbers(checks::floats_of(grad_barycentrics), 2 * count, "grad_barycentrics");
   require_numbers(grad_depths, count, "grad_depths");
   std::vector<cl_float4> places(count);
@@ -196,6 +283,28 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
   require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
   require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
   return m.resolve_backward(samples, channels, grad_pixels);
+}
+
+SamplesTangent Renderer::samples_tangent(std::span<const SceneTangent> directions) {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::samples_tangent");
+  m.require_tangents(directions);
+  return m.samples_tangent(directions);
+}
+
+std::vector<float> Renderer::resolve_tangent(std::span<const float> samples, std::size_t channels,
+                                             std::span<const float> sample_tangents,
+                                             std::span<const SceneTangent> directions) {
+  Impl& m = *impl_;
+  m.require_samples("Renderer::resolve_tangent");
+  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
+  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
+  m.require_tangents(directions);
+  if (directions.empty()) return {};
+  std::vector<float> pixels(directions.size() * channels * m.image().size());
+  m.resolve_tangent(samples, channels, sample_tangents, directions, pixels);
+  return pixels;
 }
 
 }  // namespace dpr

@@ -91,15 +91,17 @@ void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, con
   antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;
   if (sampled) sampled->draw(size, in.p.first_view);
-  blur_forward(size, raster, image);
+  blur_forward(size, raster, image, false);
   blur_holds_image_ = true;
 }
 
 void PixelNoise::blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended,
-                              Buffer<cl_float4>& pixels) {
+                              Buffer<cl_float4>& pixels, bool is_whole) {
   pixels.resize(device_, size.views * size.width * size.height);
   if (sampled) {
     sampled->forward(blended, pixels);
+  } else if (is_whole) {
+    blur.forward_whole(size, blended, pixels);
   } else {
     blur.forward(size, blended, pixels);
   }
@@ -108,7 +110,7 @@ void PixelNoise::blur_forward(const Blur::Size& size, const Buffer<cl_float4>& b
 void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
                         Buffer<cl_float4>& pixels) {
   antialias.forward(in.p, contour, samples, other_kept_);
-  blur_forward(size, samples, pixels);
+  blur_forward(size, samples, pixels, true);
   blur_holds_image_ = false;
 }
 
@@ -123,6 +125,14 @@ void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& sam
   }
   blur_holds_image_ = false;
   antialias.backward(in, contour, other_kept_, grad_samples, {kept_grad_, scratch});
+}
+
+void PixelNoise::smooth_tangent(const ContourInputs& in, const Blur::Size& size, std::size_t direction,
+                                const Tangents& tangents, Buffer<cl_float4>& samples,
+                                Buffer<cl_float4>& pixels, Buffer<float>& scratch) {
+  antialias.tangent(in, contour, other_kept_, direction, tangents, samples, {kept_grad_, scratch});
+  blur_forward(size, samples, pixels, true);
+  blur_holds_image_ = false;
 }
 
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
@@ -155,7 +165,7 @@ void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangen
   for (std::size_t d = 0; d < tangents.params.directions; ++d) {
     tangents.rasters.copy_to(moved_raster_, d * samples, samples, 0);
     antialias.tangent(in, contour, kept_, d, tangents, moved_raster_, {kept_grad_, scratch});
-    blur_forward(size, moved_raster_, moved_image_);
+    blur_forward(size, moved_raster_, moved_image_, false);
     moved_image_.copy_to(tangents.images, (tangents.first + d) * pixels);
   }
   blur_holds_image_ = false;
@@ -186,8 +196,8 @@ void Renderer::Impl::find_edges() {
 /// Hides no faces of views with shapes of their own, of which none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
-  const bool may_hide =
-      pixel_noise && frame.position_stride == 0 && !has_device_poses && scene.cull == Cull::none;
+  const bool may_hide = pixel_noise && layers == 1 && frame.position_stride == 0 && !has_device_poses &&
+                        scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none)) {
     hides_by_device_ = false;

@@ -82,6 +82,12 @@ class PixelNoise {
                        const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
                        Buffer<float>& scratch);
 
+  /// From the tangents of the samples that smooth() took last, which are blended in place, to those of its pixels,
+  /// along one of a group's directions.
+  void smooth_tangent(const ContourInputs& in, const Blur::Size& size, std::size_t direction,
+                      const Tangents& tangents, Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels,
+                      Buffer<float>& scratch);
+
   /// From the tangents of the samples, `tangents.rasters`, to those of the image, along a group's directions.
   void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents, Buffer<float>& scratch);
   /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
@@ -101,7 +107,9 @@ class PixelNoise {
   std::size_t bytes() const;
 
  private:
-  void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels);
+  /// `is_whole`: the samples may differ outside of the covered part, too.
+  void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels,
+                    bool is_whole);
 
   KeptSamples kept_, other_kept_;
   Buffer<cl_float4> grad_raster_;                 // where it has not taken the raster's place

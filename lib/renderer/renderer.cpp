@@ -89,7 +89,8 @@ void Renderer::Impl::set_up() {
   }
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
-  if (std::isfinite(hidden_reach)) rasterize.hiding.emplace(hidden_reach, device_views.cameras);
+  if (std::isfinite(hidden_reach) && layers == 1)
+    rasterize.hiding.emplace(hidden_reach, device_views.cameras);
   const Buffer<float>& hidden = hides_by_device_ ? setup.hide(frame, hidden_) : hidden_;
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden, bin.pair_starts);
   if (frame.clips != 0) clip.forward(frame, device_views, *geometry, transform, setup, bin.pair_starts);
@@ -141,6 +142,7 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
   pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
+  seen_layers_ = 1;
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {
@@ -279,6 +281,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (pixel_noise->lacks_image(wanted.smoothing)) render_again();
   } else if (pixel_noise) {
     if (pixel_noise->lacks_raster(wanted.smoothing)) render_again();
+    see_layers(1);
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
                           bands.size() == 1, aggregate.scratch(frame));
   }
@@ -351,8 +354,8 @@ std::size_t Renderer::Impl::bytes() const {
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
          (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
          (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
-         own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_group_.capacity_bytes() +
-         own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
+         own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() +
+         own_group_.capacity_bytes() + own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +

@@ -123,6 +123,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void tangent(std::span<const SceneTangent> directions);
   std::size_t tangent_bytes() const;
   void cut_for_tangents(std::size_t directions);
+  /// Directions that share a pass, of so many; and the first of what a pass of them needs.
+  std::size_t tangents_together(std::size_t directions) const;
+  void start_tangents(std::span<const SceneTangent> group, std::size_t first);
+  void set_layers(cl_uint count) noexcept;
   /// Throws InvalidArgument unless the last frame has samples for shading of the caller's own.
   void require_samples(const char* caller);
   void find_samples();
@@ -130,6 +134,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels);
   ResolveGradient resolve_backward(std::span<const float> samples, std::size_t channels,
                                    std::span<const float> grad_pixels);
+  SamplesTangent samples_tangent(std::span<const SceneTangent> directions);
+  void resolve_tangent(std::span<const float> samples, std::size_t channels,
+                       std::span<const float> sample_tangents, std::span<const SceneTangent> directions,
+                       std::span<float> pixels);
   /// Room for at least so much in all frames of the scene.
   void reserve(const FrameCounts& counts);
   /// Frames like the next one have been found to take so much.
@@ -166,6 +174,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::uint64_t frame_number = 0;           // which frame that is, among all renderers'
 
   float hidden_reach = 0;  // normalised depth behind a triangle from where on nothing is seen; or infinite
+  cl_uint layers = 1;      // surfaces of a sample that shading of the caller's own sees
 
   std::optional<Geometry> geometry;
   std::vector<Band> bands;          // of the last forward()
@@ -263,6 +272,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void add_pixel_channels(const Range& rows);
 
   SceneGradient finish_geometric_gradient();
+  void see_layers(cl_uint count);
   void upload_directions(std::span<const SceneTangent> directions);
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
@@ -274,8 +284,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void join_material_gradients();
 
   std::size_t found_emptied_ = 0;
-  Buffer<float> own_samples_, own_pixels_;                // of the caller's shading, packed
-  Buffer<cl_float4> own_group_, own_image_, grad_group_;  // four of their channels
+  cl_uint seen_layers_ = 1;                                // through which the last frame's contours are seen
+  Buffer<float> own_samples_, own_pixels_, own_tangents_;  // of the caller's shading, packed
+  Buffer<cl_float4> own_group_, own_image_, grad_group_;   // four of their channels
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
   Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;

@@ -299,6 +299,11 @@ void Renderer::Impl::set_lights(const std::optional<Lights>& lights) {
   rendered = false;
 }
 
+void Renderer::Impl::set_layers(cl_uint count) noexcept {
+  layers = count;
+  rendered = false;
+}
+
 void Renderer::Impl::set_cull(Cull cull) noexcept {
   scene.cull = cull;
   frame.culled = culled_orientation(cull);

@@ -192,22 +192,31 @@ void Renderer::Impl::cut_for_tangents(std::size_t directions) {
   bands = rasterize.cut(frame, bin, tile_rows_of(frame), budget, std::max(bytes, fragment_bytes()));
 }
 
-void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
+std::size_t Renderer::Impl::tangents_together(std::size_t directions) const {
   constexpr std::size_t k_most = 16;  // at a time
+  const std::size_t fitting = std::max<std::size_t>(device.memory_budget() / 2 / tangent_bytes(), 1);
+  return std::min({directions, fitting, k_most});
+}
+
+void Renderer::Impl::start_tangents(std::span<const SceneTangent> group, std::size_t first) {
+  upload_directions(group);
+  tangents.first = to_uint(first);
+  transform.tangent(frame, device_views, *geometry, tangents);
+  if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
+}
+
+void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   require_whole();
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(impl_of(device), directions.size() * image().size());
-  const std::size_t fitting = std::max<std::size_t>(device.memory_budget() / 2 / tangent_bytes(), 1);
-  const std::size_t together = std::min({directions.size(), fitting, k_most});
+  const std::size_t together = tangents_together(directions.size());
   cut_for_tangents(together);
+  if (pixel_noise) see_layers(1);
   for (std::size_t first = 0; first < directions.size(); first += together) {
     const auto group = directions.subspan(first, std::min(together, directions.size() - first));
-    upload_directions(group);
-    tangents.first = to_uint(first);
+    start_tangents(group, first);
     if (pixel_noise) tangents.rasters.resize(impl_of(device), group.size() * samples);
-    transform.tangent(frame, device_views, *geometry, tangents);
     if (geometry_colors) geometry_colors->tangent(frame, *geometry, transform, tangents);
-    if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {
       if (bands.size() > 1) render(band);

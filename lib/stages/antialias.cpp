@@ -22,7 +22,7 @@ std::size_t row_items(const Device::Impl& device) { return device.info.lanes == 
 }  // namespace
 
 void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                           const Contour& contour) {
+                           const Contour& contour, cl_uint layers) {
   front.resize(device_, pixels_of(p));
   front_face.resize(device_, pixels_of(p));
   const Range tiles = rasterize.tiles(p);
@@ -31,6 +31,7 @@ void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const R
   of_band.last_tile = tiles.last();
   launch_(Range{tiles.first * items, tiles.count * items},
           kernel::antialias_front{.p = of_band,
+                                  .layers = layers,
                                   .tile_starts = contour.tile_starts,
                                   .starts = rasterize.pixel_starts,
                                   .list = rasterize.list,

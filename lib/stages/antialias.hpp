@@ -34,9 +34,10 @@ class Antialias {
  public:
   explicit Antialias(Device::Impl& device) : device_(device), launch_(device) {}
 
-  /// The front-most depths of the samples near contours of the rasterizer's band.
+  /// The depths behind which the samples near contours of the rasterizer's band show none: those of the
+  /// front-most surfaces, or of the last of so many `layers`.
   void find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                  const Contour& contour);
+                  const Contour& contour, cl_uint layers = 1);
   /// Finds what crosses the steps between samples; after find_front() of the window. Surfaces p.depth_reach
   /// (normalised depth) behind the nearest count as seen. `wanted`, here and below: the rows of tiles whose results
   /// are, k_rows_around less than the window where the view goes on; or all of the window.
@@ -62,7 +63,7 @@ class Antialias {
       sizeof(float) + 3 * sizeof(cl_uint) + 2 * sizeof(cl_float2) +
       DPR_SECOND_CROSSINGS * (sizeof(shared::SecondCrossing) + sizeof(cl_float2)) / (2 * DPR_TILE) + 1;
 
-  Buffer<float> front;         ///< [sample] view depth, infinite where nothing is; only near contours
+  Buffer<float> front;         ///< [sample] view depth, infinite where nothing hides; only near contours
   Buffer<cl_uint> front_face;  ///< [sample] view * faces + face of what is there
   Buffer<cl_uint> winner;  ///< [2][sample] what crosses the steps to the right, and down; only near contours
   Buffer<cl_float2> cut;   ///< [2][sample] what it cuts: Cut of kernels/crossing.h

@@ -228,6 +228,12 @@ void Blur::forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_
   finish(size, image);
 }
 
+void Blur::forward_whole(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image) {
+  const std::size_t known = std::exchange(tile_rows_, 0);
+  forward(size, raster, image);
+  tile_rows_ = known;
+}
+
 void Blur::add(const Size& size, const Buffer<cl_float4>& raster, const Lines& lines) {
   add_columns(first_pass(axis(size.height)), size.views, axis(size.width).samples,
               is_coarse() ? now_.reduce : now_.weights, raster, lines, is_coarse() ? scratch_ : between_);

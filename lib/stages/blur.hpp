@@ -33,6 +33,8 @@ class Blur {
   void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
+  /// The same of a raster all of which may differ, whatever extents are known.
+  void forward_whole(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
   /// Lines of samples, of all views one after the other, and the first of those that a raster holds.
   struct Lines {
     Range of;

@@ -925,6 +925,7 @@ static void test_frame_samples(void) {
     OK(dpr_frame_samples_backward(frame, samples + 2, 1, &gradient, 1)); /* a gradient of nothing */
     for (i = 0; i < 9; ++i) EXPECT(inside[i] == 0);
     REFUSED(dpr_frame_samples(frame, &image, 1), "face_id");
+    EXPECT(raster.layers == 1);
     REFUSED(dpr_frame_samples_backward(frame, samples, 1, &gradient, 1), "barycentrics or depth");
     wrong.shape[2] = SIDE;
     REFUSED(dpr_frame_resolve(frame, &wrong, &resolved), "values");

@@ -243,6 +243,41 @@ class NvdiffrastTest(tensors.TestCase):
                 ends = [float(loss(sign * 0.5 * length * direction)) for sign in (1, -1)]
                 self.assertLess(abs(total - (ends[0] - ends[1])), 0.01 * abs(ends[0] - ends[1]) + 0.1)
 
+    def test_layers(self):
+        """The second layer of a cube is what a cube without its front shows; there is no third."""
+        pos, tri = clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES)
+        with dr.DepthPeeler(CONTEXT, pos, tri, [H, W]) as peeler:
+            (first, first_db), (second, second_db), (third, third_db) = (peeler.rasterize_next_layer() for _ in range(3))
+        alone, alone_db = dr.rasterize(CONTEXT, pos, tri, [H, W])
+        self.assertTrue(torch.equal(first, alone) and torch.equal(first_db, alone_db))
+        self.assertFalse(third.any() or third_db.any())
+        front = first[..., 3].unique()[1:].long() - 1
+        rest = torch.ones(len(tri), dtype=torch.bool).index_fill(0, front, False)
+        behind, behind_db = dr.rasterize(CONTEXT, pos, tri[rest], [H, W])
+        number = torch.cat([torch.zeros(1), rest.nonzero()[:, 0] + 1.0])[behind[..., 3].long()]
+        self.assertTrue(torch.equal(second[..., 3], number))
+        self.assertLess(float((second[..., :3] - behind[..., :3]).abs().max()), 1e-5)
+        self.assertLess(float((second_db - behind_db).abs().max()), 1e-4)
+
+    def test_outlines_of_layers(self):
+        """A square behind another that fills the image: the second layer's gradient is that of the square alone."""
+        corners = torch.tensor([[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]])
+        tri = torch.tensor([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+        found = []
+        for peeled in (True, False):
+            square = (0.5 * corners).requires_grad_()
+            far = torch.cat([square, torch.full((4, 1), 0.5), torch.ones(4, 1)], 1)
+            near = torch.cat([3 * corners, torch.full((4, 1), -0.5), torch.ones(4, 1)], 1)
+            pos = torch.cat([near if peeled else far.detach() * 0, far])[None]
+            with dr.DepthPeeler(CONTEXT, pos, tri, [H, W]) as peeler:
+                for _ in range(2 if peeled else 1):
+                    rast, _ = peeler.rasterize_next_layer()
+            image = dr.antialias((rast[..., 3:] > 0).float().contiguous(), rast, pos, tri)
+            found.append((image.detach(), *torch.autograd.grad(image.sum(), square)))
+        for peeled, alone in zip(*found):
+            self.assertGreater(float(alone.abs().max()), 0.5)
+            self.assertLess(float((peeled - alone).abs().max()), 1e-4 * float(alone.abs().max()))
+
     def test_files_of_rast(self):
         pos, tri = clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES)
         rast, _ = dr.rasterize(CONTEXT, pos, tri, [H, W])
@@ -258,8 +293,9 @@ class NvdiffrastTest(tensors.TestCase):
         dr.set_log_level(2)
         self.assertEqual(dr.get_log_level(), 2)
         dr.set_log_level(1)
-        with self.assertRaisesRegex(NotImplementedError, "DepthPeeler"):
-            dr.DepthPeeler(CONTEXT, None, None, [H, W])
+        peeler = dr.DepthPeeler(CONTEXT, clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES), [H, W])
+        with self.assertRaisesRegex(RuntimeError, "with statement"):
+            peeler.rasterize_next_layer()
         context = dr.RasterizeGLContext(output_db=False, mode="manual", device="cuda:0")
         context.set_context()
         context.release_context()

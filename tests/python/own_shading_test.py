@@ -104,6 +104,110 @@ class OwnShadingTest(unittest.TestCase):
         samples.interpolate(depths).sum().backward()
         self.check_close(found, vertices.grad, 1e-3)
 
+    def test_layers(self):
+        samples = RENDERER.rasterize(*self.arguments(), layers=3)
+        front, back, none = samples.layers
+        for name in ("face_id", "barycentrics", "depth"):
+            self.assertTrue((getattr(samples, name) == getattr(front, name)).all())
+        # A tetrahedron has a front and a back.
+        self.assertTrue((front.mask == back.mask).all() and front.mask.any() and not none.mask.any())
+        self.assertTrue((back.depth >= front.depth).all() and (back.face_id != front.face_id)[front.mask].all())
+        # The whole way through the body, by its gradient: two layers of depths, which move apart.
+        thickness = (back.depth - front.depth)[..., None]
+        image, by_contours = front.resolve_with_vjp(thickness)
+        grad_values, by_name = by_contours(np.ones_like(image))
+        inside = back.pullback(depth=grad_values[..., 0])["vertices"] + front.pullback(depth=-grad_values[..., 0])["vertices"]
+
+        def total(scale):
+            layers = RENDERER.rasterize(*self.arguments((scale * TETRAHEDRON).astype(np.float32)), layers=2).layers
+            return float(layers[0].resolve((layers[1].depth - layers[0].depth)[..., None]).sum(dtype=np.float64))
+        measured = (total(1.05) - total(0.95)) / 0.1
+        along = float(((inside + by_name["vertices"]) * TETRAHEDRON).sum())
+        self.assertLess(abs(along - measured), 0.02 * abs(measured))
+
+    @unittest.skipUnless(torch, "no PyTorch")
+    def test_see_through(self):
+        """Two walls, one before the other: the further one's outline has a gradient as far as it is seen."""
+        corners = np.float32([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        near = np.concatenate([9 * corners, np.full((4, 1), 1)], 1)
+        far = torch.tensor(np.concatenate([0.5 * corners, np.zeros((4, 1))], 1), dtype=torch.float32, requires_grad=True)
+        faces = torch.tensor([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+        view = torch.eye(4)[None].clone()
+        view[0, 2, 3] = -5
+        renderer = dpr.Renderer(SIZE, SIZE, blur=0.5, znear=1.0, zfar=20.0)
+        for layers, jump in ((2, 0.75), (1, 0.0)):
+            vertices = torch.cat([torch.tensor(near, dtype=torch.float32), far])
+            samples = renderer.rasterize(vertices, faces, view, torch.tensor([[2.0]]), layers=layers)
+            shown = torch.zeros(samples.face_id.shape)
+            for layer in reversed(samples.layers):
+                alpha = torch.where(layer.face_id < 2, 0.25, 1.0) * layer.mask
+                shown = alpha * layer.mask + (1 - alpha) * shown - alpha * (layer.face_id < 2)
+            image = samples.resolve(shown[..., None])
+            pixels_a_unit = SIZE / 2
+            self.assertAlmostEqual(float(image.detach().sum()), jump * pixels_a_unit**2, delta=0.01 * pixels_a_unit**2)
+            gradient, = torch.autograd.grad(image.sum(), far)
+            right = float(gradient[1, 0] + gradient[2, 0])
+            self.assertAlmostEqual(right, jump * pixels_a_unit**2, delta=2e-3 * pixels_a_unit**2)
+
+    def check_transposed(self, tangents, weights, moved, gradients):
+        """<u, J v> = <J^T u, v>, a row a direction."""
+        for k, tangent in enumerate(tangents):
+            terms = np.asarray(tangent, np.float64) * weights
+            by_gradient = sum((np.asarray(moved[name][k], np.float64) * gradient).sum() for name, gradient in gradients.items())
+            self.assertGreater(abs(by_gradient), 0)
+            self.assertLess(abs(terms.sum() - by_gradient), 2e-5 * np.abs(terms).sum())
+
+    def test_forward_mode(self):
+        arrays = dict(zip(("vertices", "views", "intrinsics"), (TETRAHEDRON, self.views, self.intrinsics)))
+        moved = {name: random(3, *array.shape, seed=i) - 0.5 for i, (name, array) in enumerate(arrays.items())}
+        samples = RENDERER.rasterize(*self.arguments(), layers=2)
+        for layer in samples.layers:
+            barycentrics, depth = layer.jvp(moved)
+            for weights, tangents, name in ((random(*layer.barycentrics.shape, seed=4), barycentrics, "barycentrics"),
+                                            (random(*layer.depth.shape, seed=5), depth, "depth")):
+                self.check_transposed(tangents, weights, moved, layer.pullback(**{name: weights}))
+        values, moved_values = random(*samples.face_id.shape, 5, seed=6), random(3, *samples.face_id.shape, 5, seed=7)
+        weights = random(2, SIZE, SIZE, 5, seed=8) - 0.5
+        images, pullback = samples.resolve_with_vjp(values)
+        grad_values, by_name = pullback(weights)
+        found, tangents = samples.resolve_with_jvp(values, moved_values, moved)
+        self.assertTrue((found == images).all())
+        self.check_transposed(tangents, weights, {**moved, "values": moved_values}, {**by_name, "values": grad_values})
+        self.check_transposed(samples.resolve_with_jvp(values, moved_values)[1], weights, {"values": moved_values},
+                              {"values": grad_values})
+        self.check_transposed(samples.resolve_with_jvp(values, tangents=moved)[1], weights, moved, by_name)
+        with self.assertRaisesRegex(ValueError, "tangents"):
+            samples.resolve_with_jvp(values)
+        with self.assertRaisesRegex(ValueError, "tangents of vertices"):
+            samples.jvp({"vertices": TETRAHEDRON})
+        with self.assertRaisesRegex(ValueError, "tangents of values"):
+            samples.resolve_with_jvp(values, moved_values[:, 1:])
+
+    @unittest.skipUnless(torch and hasattr(torch, "func"), "no torch.func")
+    def test_forward_mode_of_pytorch(self):
+        faces, weights = torch.from_numpy(FACES), torch.from_numpy(WEIGHTS)
+        vertices, views, intrinsics, colors = map(torch.from_numpy, (TETRAHEDRON, self.views, self.intrinsics, COLORS))
+        way = torch.from_numpy(random(*TETRAHEDRON.shape, seed=2) - 0.5)
+
+        def shaded_by(vertices, colors):
+            samples = RENDERER.rasterize(vertices, faces, views, intrinsics)
+            return samples.resolve(torch.cat([samples.interpolate(colors), samples.depth[..., None]], -1))
+
+        leaf, color = vertices.clone().requires_grad_(), colors.clone().requires_grad_()
+        gradients = torch.autograd.grad((shaded_by(leaf, color) * weights).sum(), (leaf, color))
+        image, tangent = torch.func.jvp(shaded_by, (vertices, colors), (way, colors))
+        self.check_close(image, shaded_by(vertices, colors), 1e-6)
+        wanted = float((gradients[0] * way).sum() + (gradients[1] * colors).sum())
+        self.assertAlmostEqual(float((tangent * weights).sum()), wanted, delta=1e-4 * abs(wanted))
+
+        def of_two(numbers):
+            return shaded_by(vertices + numbers[0] * way, colors + numbers[1])
+        jacobian = torch.func.jacfwd(of_two)(torch.zeros(2))
+        self.assertEqual(jacobian.shape, (2, SIZE, SIZE, 4, 2))
+        for k, expected in enumerate((gradients[0] * way, gradients[1])):
+            found = float((jacobian[..., k] * weights).sum())
+            self.assertAlmostEqual(found, float(expected.sum()), delta=1e-4 * abs(found))
+
     def test_any_number_of_channels(self):
         samples = RENDERER.rasterize(*self.arguments())
         values = random(*samples.face_id.shape, 7, seed=1)
@@ -124,6 +228,11 @@ class OwnShadingTest(unittest.TestCase):
             samples.pullback(barycentrics=np.zeros(3, np.float32))
         with self.assertRaisesRegex(ValueError, r"attributes .*\[V, C\]"):
             samples.interpolate(np.zeros(4, np.float32))
+        for layers in (0, 257, 1.5, "many"):
+            with self.assertRaisesRegex(ValueError, "layers .*1 to 256"):
+                RENDERER.rasterize(*self.arguments(), layers=layers)
+        with self.assertRaisesRegex(ValueError, "layers"):
+            dpr.Renderer(SIZE, SIZE, layers=2)
         with self.assertRaisesRegex(ValueError, "2 meshes"):
             dpr.rasterize([TETRAHEDRON, TETRAHEDRON], [FACES, FACES], self.views, self.intrinsics, width=SIZE, height=SIZE)
 

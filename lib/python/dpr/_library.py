@@ -49,7 +49,7 @@ class Options(ctypes.Structure):
 
 class Raster(ctypes.Structure):
     """dpr_raster"""
-    _fields_ = [(name, ctypes.c_int) for name in ("width", "height", "supersampling", "margin")]
+    _fields_ = [(name, ctypes.c_int) for name in ("width", "height", "supersampling", "margin", "layers")]
 
 
 class MeshContents(ctypes.Structure):
@@ -82,6 +82,8 @@ _SIGNATURES = {
     "dpr_frame_samples_backward": [_HANDLE, *_ARRAYS, *_ARRAYS],
     "dpr_frame_resolve": [_HANDLE, ctypes.POINTER(Array), ctypes.POINTER(Array)],
     "dpr_frame_resolve_backward": [_HANDLE, *[ctypes.POINTER(Array)] * 3, *_ARRAYS],
+    "dpr_frame_samples_tangent": [_HANDLE, ctypes.c_size_t, *_ARRAYS, *_ARRAYS],
+    "dpr_frame_resolve_tangent": [_HANDLE, ctypes.c_size_t, *_ARRAYS, *[ctypes.POINTER(Array)] * 3],
     "dpr_frame_is_empty": [_HANDLE, ctypes.POINTER(ctypes.c_int)],
     "dpr_frames_release": [],
     "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],

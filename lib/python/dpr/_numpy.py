@@ -42,7 +42,7 @@ def _at(path, place):
     return place
 
 
-def _tangents_of_leaves(plan, tangents):
+def tangents_of_leaves(plan, tangents):
     """{number of a leaf: [K, ...]}"""
     if not isinstance(tangents, dict):
         _arrays.fail(TypeError, "tangents", type(tangents).__name__, "a dictionary by names of arrays")
@@ -73,7 +73,7 @@ def _tangents_of_leaves(plan, tangents):
 
 def jvp(spec, plan, tangents):
     """(outputs, tangents of the images, warning)"""
-    moved = _tangents_of_leaves(plan, tangents)
+    moved = tangents_of_leaves(plan, tangents)
     rendered = _frames.Rendered(spec, [_arrays.to_numpy(leaf) for leaf in plan.leaves], tuple(moved))
     home = plan.given[0]
     return ([_arrays.like(home, output) for output in rendered.outputs], _arrays.like(home, rendered.tangents(moved)),

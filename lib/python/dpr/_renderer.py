@@ -225,16 +225,18 @@ class Renderer:
         found, pullback, warning = _numpy.vjp(spec, plan, wrt)
         return _result(spec, found, warning), pullback
 
-    def rasterize(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
+    def rasterize(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *, layers: int = 1,
                   copy: bool = False) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
         The arguments are those of a call, of one mesh or N shapes of it; of NumPy, PyTorch, or any library with DLPack.
+        layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
         values of any number of channels that are made of them become images by resolve(), which follow the contours: with
         derivatives by vertices, views and intrinsics, as the library's own images have them. Of the surfaces at a sample
-        the nearest alone counts; where two cut through one another, their line has no contour, and no gradient. sigma has
+        the nearest `layers` count, each by Samples.layers: what is blended of them follows also the contours that fewer
+        surfaces hide. Where two cut through one another, their line has no contour, and no gradient. sigma has
         none either. Raises ValueError (dpr.InvalidArgument) for another preset than "pixel".
 
             samples = renderer.rasterize(vertices, faces, views, intrinsics)
@@ -242,6 +244,7 @@ class Renderer:
             image = samples.resolve(my_shader(normals))  # [N, height, width, C]
         """
         spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy})
+        spec = spec._replace(settings=(*spec.settings, _plan.setting("layers", layers)))
         return _samples.rasterize(spec, plan, copy)
 
     def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
@@ -317,7 +320,7 @@ _DEFAULT_BLUR = 1  # pixels, of the preset "pixel"
 _DEFAULTS = Renderer.__call__.__kwdefaults__
 _OF_A_CALL = tuple(_DEFAULTS)
 _OF_A_MESH = _OF_A_CALL[:_OF_A_CALL.index("background")]
-_SETTINGS = tuple(name for name in ("blur", *_library.setting_names) if name not in _OF_A_MESH)
+_SETTINGS = tuple(name for name in ("blur", *_library.setting_names) if name not in (*_OF_A_MESH, "layers"))
 _OF_A_RENDERER = ("width", "height", "device", *_SETTINGS)
 
 
@@ -353,10 +356,10 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
     return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
 
 
-def rasterize(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
+def rasterize(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
               copy: bool = False, **settings: Setting) -> Samples:
     """Renderer(width, height, **settings).rasterize(): see there."""
-    return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, copy=copy)
+    return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, layers=layers, copy=copy)
 
 
 def subdivide(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,

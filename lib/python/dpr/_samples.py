@@ -1,11 +1,13 @@
 """Shading of the caller's own, with noise on the pixel around it."""
+from __future__ import annotations
+
 import ctypes
 import sys
 from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from . import _arrays, _frames, _library
+from . import _arrays, _frames, _library, _numpy
 
 Array = Any
 _NAMES = ("face_id", "barycentrics", "depth")
@@ -14,7 +16,7 @@ _NAMES = ("face_id", "barycentrics", "depth")
 class Rasterized:
     """A frame, and what its samples show.
 
-    outputs  [face_id, barycentrics, depth]
+    outputs  [face_id, barycentrics, depth], each [layer, view, ...]
     """
 
     def __init__(self, spec, arrays, wanted):
@@ -32,8 +34,9 @@ class Rasterized:
         _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
         count = next(len(array) for name, array in named if name == "views")
         self.size, self._image_size = (count, self.raster.height, self.raster.width), (count, spec.height, spec.width)
-        self.outputs = [np.empty(self.size, np.int64), np.empty(self.size + (3,), np.float32), np.empty(self.size, np.float32)]
-        _library.call("dpr_frame_samples", self._frame.handle, *_frames.c_arrays(list(zip(_NAMES, self.outputs))))
+        size = (self.raster.layers, *self.size)
+        self.outputs = [np.empty(size, np.int64), np.empty((*size, 3), np.float32), np.empty(size, np.float32)]
+        _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, self.outputs)))
 
     def _room(self):
         """({leaf: gradient}, the same as arrays of the library)"""
@@ -42,11 +45,20 @@ class Rasterized:
 
     def gradients(self, grads):
         """{leaf: gradient} of sum <grad, output>, by the outputs' names."""
-        shapes = dict(zip(_NAMES, (output.shape for output in self.outputs)))
-        named = [(name, _checked(name, grad, shapes[name])) for name, grad in grads.items() if grad is not None]
+        named = [(name, np.ascontiguousarray(_arrays.to_numpy(grad), np.float32)) for name, grad in grads.items()
+                 if grad is not None]
         found, room = self._room()
-        _library.call("dpr_frame_samples_backward", self._frame.handle, *_frames.c_arrays(named), *room)
+        _library.call("dpr_frame_samples_backward", self._frame.handle, *_of_layers(named), *room)
         return found
+
+    def gradients_of_layer(self, layer, grads):
+        """The same by the outputs of one layer."""
+        whole = {}
+        for name, output in zip(_NAMES, self.outputs):
+            if grads.get(name) is not None:
+                whole[name] = np.zeros(output.shape, np.float32)
+                whole[name][layer] = _checked(name, grads[name], output.shape[1:])
+        return self.gradients(whole)
 
     def resolve(self, values):
         values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim else 0))
@@ -65,6 +77,37 @@ class Rasterized:
         return grad_values, found
 
 
+    def tangents(self, count, given):
+        """Tangents [count, *output.shape] of barycentrics and depth along {leaf: [count, ...]} of arrays that were wanted."""
+        found = [np.empty((count, *output.shape), np.float32) for output in self.outputs[1:]]
+        rows = [(name, array.reshape(-1, *array.shape[3:])) for name, array in zip(_NAMES[1:], found)]
+        _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *self._moving(count, given),
+                      *_frames.c_arrays(rows))
+        return found
+
+    def resolve_tangents(self, count, values, value_tangents, given):
+        """Tangents [count, N, height, width, C] of resolve(values), along {leaf: [count, ...]} of arrays that were wanted.
+        value_tangents: [count, *values.shape], or None where the values stay."""
+        values = _checked("values", values, (*self.size, values.shape[-1]))
+        moved = np.zeros((count, *values.shape), np.float32) if value_tangents is None else \
+            _checked("tangents of values", value_tangents, (count, *values.shape))
+        images = np.empty((count, *self._image_size, values.shape[-1]), np.float32)
+        _library.call("dpr_frame_resolve_tangent", self._frame.handle, count, *self._moving(count, given),
+                      _one("values", values), _one("value_tangents", moved.reshape(-1, *values.shape[1:])),
+                      _one("images", images.reshape(-1, *images.shape[2:])))
+        return images
+
+    def _moving(self, count, given):
+        given = {leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}
+        return _frames.c_arrays([(part.name, given[part.leaf].reshape(count, -1)) for part in self._parts
+                                 if part.leaf in given])
+
+
+def _of_layers(named):
+    """(name, packed array [layer, view, ...]) pairs as (dpr_array[], count): the layers' views are one after the other."""
+    return _frames.c_arrays([(name, array.reshape(-1, *array.shape[2:])) for name, array in named])
+
+
 def _one(name, array):
     return _frames.c_arrays([(name, array)])[0]
 
@@ -73,21 +116,20 @@ def _checked(name, array, shape):
     """Packed floats. Fails for another shape."""
     array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
     if array.shape != shape or not array.size:
-        _arrays.fail(ValueError, name, list(array.shape), [*shape[:3], *("C" if size == 0 else size for size in shape[3:])],
-                     "dpr.Samples")
+        _arrays.fail(ValueError, name, list(array.shape), ["C" if size == 0 else size for size in shape], "dpr.Samples")
     return array
 
 
 class Samples:
     """What the samples of the rigid image show, for shading of the caller's own: see Renderer.rasterize().
 
-    face_id        [N, h, w], int64: the nearest face, -1 where nothing is
+    face_id        [N, h, w], int64: the layer's face, -1 where nothing is
     barycentrics   [N, h, w, 3] of that face's corners, with perspective; 0 where nothing is
     depth          [N, h, w] along the view direction, world units; 0 where nothing is
     supersampling  samples a pixel and axis; margin: samples around the image, so that h = height supersampling + 2 margin
 
     With PyTorch barycentrics, depth and what is made of them have derivatives by vertices, views and intrinsics; with other
-    arrays pullback() and resolve_with_vjp() have them.
+    arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and resolve_with_jvp().
     """
 
     face_id: Array
@@ -96,10 +138,17 @@ class Samples:
     supersampling: int
     margin: int
 
-    def __init__(self, rasterized, outputs, faces, plan, tensors):
-        self._rasterized, self._faces, self._plan, self._tensors = rasterized, faces, plan, tensors
-        self.face_id, self.barycentrics, self.depth = outputs
+    def __init__(self, rasterized, outputs, faces, plan, tensors, layer=0):
+        self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
+        self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
+        self._outputs = outputs
+
+    @property
+    def layers(self) -> Tuple[Samples, ...]:
+        """Samples of each layer, the nearest first, as many as rasterize() was asked for."""
+        return tuple(Samples(self._rasterized, self._outputs, self._faces, self._plan, self._tensors, layer)
+                     for layer in range(self._rasterized.raster.layers))
 
     @property
     def mask(self) -> Array:
@@ -122,7 +171,8 @@ class Samples:
     def resolve(self, values: Array) -> Array:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
-        the background's. Raises ValueError for another shape, and what is not finite."""
+        the background's. It does not matter which layer's this is: contours count unless as many surfaces as there are
+        layers hide them. Raises ValueError for another shape, and what is not finite."""
         if self._tensors is not None:
             from . import _torch
             return _torch.resolve(self._rasterized, values, self._tensors)
@@ -142,7 +192,34 @@ class Samples:
     def pullback(self, barycentrics: Optional[Array] = None, depth: Optional[Array] = None) -> Dict[str, Array]:
         """Gradients of vertices, views and intrinsics, by name, from those of barycentrics and depth. They leave out how
         contours move, which resolve_with_vjp() has: add up both."""
-        return self._by_name(self._rasterized.gradients({"barycentrics": barycentrics, "depth": depth}))
+        grads = {"barycentrics": barycentrics, "depth": depth}
+        return self._by_name(self._rasterized.gradients_of_layer(self._layer, grads))
+
+    def jvp(self, tangents: Dict[str, Array]) -> Tuple[Array, Array]:
+        """Tangents of barycentrics [K, N, h, w, 3] and depth [K, N, h, w] along K directions at once: forward mode.
+
+        tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape]. PyTorch
+        takes its own by torch.func.jvp and torch.autograd.forward_ad."""
+        count, given = self._moving(tangents)
+        found = self._rasterized.tangents(count, given)
+        return tuple(_arrays.like(self._plan.given[0], tangent[:, self._layer]) for tangent in found)
+
+    def resolve_with_jvp(self, values: Array, value_tangents: Optional[Array] = None,
+                         tangents: Optional[Dict[str, Array]] = None) -> Tuple[Array, Array]:
+        """(resolve(values), its tangents [K, N, height, width, C]) along K directions, in which the values change by
+        value_tangents [K, *values.shape], and by way of the contours, vertices, views and intrinsics by `tangents` as
+        jvp() takes them; of both, those left out stay."""
+        kept = np.array(_arrays.to_numpy(values), np.float32)
+        if value_tangents is None and tangents is None:
+            _arrays.fail(ValueError, "tangents", "none", "those of the values, or of one array at least", "dpr.Samples")
+        count, given = (len(value_tangents), {}) if tangents is None else self._moving(tangents)
+        found = self._rasterized.resolve_tangents(count, kept, value_tangents, given)
+        return _arrays.like(values, self._rasterized.resolve(kept)), _arrays.like(values, found)
+
+    def _moving(self, tangents):
+        """(K, {leaf: tangents})"""
+        given = _numpy.tangents_of_leaves(self._plan, tangents)
+        return len(next(iter(given.values()))), given
 
     def _by_name(self, found):
         plan = self._plan

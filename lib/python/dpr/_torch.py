@@ -85,6 +85,13 @@ class _Gradients(_Derivative):
         return tuple(torch.stack(rows) for rows in zip(*found)), (0,) * len(call.wanted)
 
 
+def _stretched(info, tensors, dimensions):
+    """Tangents [K, ...] of a batch of directions, as [batch * K, ...]."""
+    rows = [tensor.expand(info.batch_size, *tensor.shape) if dimension is None else tensor.movedim(dimension, 0)
+            for tensor, dimension in zip(tensors, dimensions)]
+    return [row.flatten(0, 1) for row in rows]
+
+
 @_one_forward
 class _Tangents(_Derivative):
     """(tangents [K, ...] of the tensors with these numbers, all tensors) to the images' tangents, [K, ...]."""
@@ -95,9 +102,8 @@ class _Tangents(_Derivative):
 
     @staticmethod
     def vmap(info, dimensions, call, numbers, *tensors):
-        rows = [tensor.expand(info.batch_size, *tensor.shape) if dimension is None else tensor.movedim(dimension, 0)
-                for tensor, dimension in zip(tensors[:len(numbers)], dimensions[2:])]
-        images = _Tangents.apply(call, numbers, *(row.flatten(0, 1) for row in rows), *tensors[len(numbers):])
+        rows = _stretched(info, tensors[:len(numbers)], dimensions[2:])
+        images = _Tangents.apply(call, numbers, *rows, *tensors[len(numbers):])
         return images.unflatten(0, (info.batch_size, -1)), 0
 
 
@@ -140,6 +146,41 @@ class _Render(torch.autograd.Function):
 
 
 @_one_forward
+class _SampleTangents(_Derivative):
+    """(tangents [K, ...] of the tensors with these numbers, all tensors) to those of barycentrics and depth, [K, ...]."""
+
+    @staticmethod
+    def forward(rasterized, numbers, *tensors):
+        given = {i: _arrays.to_numpy(tensor) for i, tensor in zip(numbers, tensors)}
+        return tuple(_tensor(found) for found in rasterized.tangents(len(tensors[0]), given))
+
+    @staticmethod
+    def vmap(info, dimensions, rasterized, numbers, *tensors):
+        count = len(numbers)
+        found = _SampleTangents.apply(rasterized, numbers, *_stretched(info, tensors[:count], dimensions[2:]), *tensors[count:])
+        return tuple(tensor.unflatten(0, (info.batch_size, -1)) for tensor in found), (0, 0)
+
+
+@_one_forward
+class _ImageTangents(_Derivative):
+    """(tangents [K, ...] of the values and of the tensors with these numbers, the values, all tensors) to those of the
+    images, [K, ...]."""
+
+    @staticmethod
+    def forward(rasterized, numbers, moved, *tensors):
+        given = {i: _arrays.to_numpy(tensor) for i, tensor in zip(numbers, tensors)}
+        values = _arrays.to_numpy(tensors[len(numbers)])
+        return _tensor(rasterized.resolve_tangents(len(moved), values, _arrays.to_numpy(moved), given))
+
+    @staticmethod
+    def vmap(info, dimensions, rasterized, numbers, moved, *tensors):
+        count = len(numbers)
+        rows = _stretched(info, (moved, *tensors[:count]), dimensions[2:])
+        images = _ImageTangents.apply(rasterized, numbers, *rows, *tensors[count:])
+        return images.unflatten(0, (info.batch_size, -1)), 0
+
+
+@_one_forward
 class _Rasterize(torch.autograd.Function):
     """(tensors of a call) to face_id, barycentrics and depth."""
 
@@ -152,6 +193,7 @@ class _Rasterize(torch.autograd.Function):
     def setup_context(ctx, inputs, outputs):
         ctx.call, *tensors = inputs
         ctx.count = len(tensors)
+        ctx.save_for_forward(*tensors)
         ctx.mark_non_differentiable(outputs[0])
 
     @staticmethod
@@ -159,6 +201,12 @@ class _Rasterize(torch.autograd.Function):
     def backward(ctx, _, grad_barycentrics, grad_depth):
         found = ctx.call.rendered.gradients({"barycentrics": grad_barycentrics, "depth": grad_depth})
         return (None, *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
+
+    @staticmethod
+    def jvp(ctx, _, *tangents):
+        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        found = _SampleTangents.apply(ctx.call.rendered, numbers, *(tangents[i][None] for i in numbers), *ctx.saved_tensors)
+        return (None, *(tangent[0] for tangent in found))
 
 
 @_one_forward
@@ -174,6 +222,7 @@ class _Resolve(torch.autograd.Function):
         ctx.rasterized, values, *tensors = inputs
         ctx.count = len(tensors)
         ctx.save_for_backward(values)
+        ctx.save_for_forward(values, *tensors)
 
     @staticmethod
     @once_differentiable
@@ -182,13 +231,22 @@ class _Resolve(torch.autograd.Function):
         grad_values, found = ctx.rasterized.resolve_gradients(_arrays.to_numpy(values), _arrays.to_numpy(grad_images))
         return (None, _tensor(grad_values), *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
 
+    @staticmethod
+    def jvp(ctx, _, moved, *tangents):
+        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        values = ctx.saved_tensors[0]
+        moved = torch.zeros_like(values) if moved is None else moved
+        images = _ImageTangents.apply(ctx.rasterized, numbers, moved[None], *(tangents[i][None] for i in numbers),
+                                      *ctx.saved_tensors)
+        return images[0]
+
 
 def rasterize(spec, leaves, copy):
     """(Rasterized, its outputs, the tensors that resolve() depends on)"""
     tensors = [leaf if isinstance(leaf, torch.Tensor) else torch.from_dlpack(_arrays.to_numpy(leaf)) for leaf in leaves]
     if copy:
         tensors = [tensor.cpu() for tensor in tensors]
-    call = _Call(spec, tuple(i for i, tensor in enumerate(tensors) if tensor.requires_grad))
+    call = _Call(spec, tuple(i for i, tensor in enumerate(tensors) if _is_wanted(tensor)))
     outputs = _Rasterize.apply(call, *tensors)
     return call.rendered, outputs, tensors
 

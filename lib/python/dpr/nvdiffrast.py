@@ -10,7 +10,7 @@ Names, arguments, shapes and conventions are nvdiffrast's: positions are in Open
 at the bottom, u and v are the weights of a triangle's corners 0 and 1. Tensors are float32, triangles int32 or int64.
 
 Differences: antialias() is the library's own, Samples.resolve() without a blur, so blended pixels have slightly other
-colours, and gradients of positions are those of the library. DepthPeeler raises NotImplementedError.
+colours, and gradients of positions are those of the library. DepthPeeler rasterizes anew for every layer.
 """
 from __future__ import annotations
 
@@ -84,14 +84,6 @@ class RasterizeGLContext(_Context):
         """Does nothing."""
 
 
-class DepthPeeler:
-    """Not available: the library's samples hold only the nearest surface."""
-
-    def __init__(self, *arguments: Any, **keywords: Any):
-        raise NotImplementedError("dpr: error: DepthPeeler (dpr.nvdiffrast): got a call, expected none: not "
-                                  "implemented, because the library's samples hold only the nearest surface")
-
-
 class _TopologyHash:
     """Result of antialias_construct_topology_hash()."""
 
@@ -132,13 +124,15 @@ class _Frame:
     faces, first  the triangles, and the index of the first one in tri
     """
 
-    def __init__(self, device, pos, faces, first, height, width, call):
-        """pos: [N, V, 4]"""
+    def __init__(self, device, pos, faces, first, size, call, layers):
+        """pos: [N, V, 4]; size: (height, width). Shows the last of so many layers."""
+        height, width = size
         self.faces, self.first, self._height, self._width, self._call = faces, first, height, width, call
         camera, self.vertices = self._placed(pos)
         renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
         self._camera = camera
-        self._samples = renderer.rasterize(self.vertices, faces, *camera.views_and_intrinsics(len(pos), width, height))
+        views_and_intrinsics = camera.views_and_intrinsics(len(pos), width, height)
+        self._samples = renderer.rasterize(self.vertices, faces, *views_and_intrinsics, layers=layers).layers[-1]
         self._has_gradient = self.vertices.requires_grad
 
     def _placed(self, pos):
@@ -222,12 +216,13 @@ def _slopes(corners):
 
 
 class _Frames:
-    """Frames of one rasterize() call: one for all images, or with ranges one for each; None for an empty range."""
+    """Frames of one layer of one rasterize() call: one for all images, or with ranges one for each; None for an empty
+    range. layers: as many surfaces as the layer's number, from 1 on."""
 
-    def __init__(self, device, pos, tri, ranges, height, width, call):
-        self.device, self.tri, self.ranges, self._size = device, tri, ranges, (height, width)
+    def __init__(self, device, pos, tri, ranges, size, call, layers=1):
+        self.device, self.tri, self.ranges, self.layers, self._size = device, tri, ranges, layers, size
         pos, ranges = _shapes(pos), [(0, len(tri))] if ranges is None else ranges
-        self._frames = [_Frame(device, pos, tri[first:first + count], first, height, width, call) if count else None
+        self._frames = [_Frame(device, pos, tri[first:first + count], first, size, call, layers) if count else None
                         for first, count in ranges]
 
     def __reduce__(self):
@@ -298,15 +293,50 @@ def rasterize(glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tenso
     Returns rast [N, H, W, 4] with u, v, z/w and the triangle's index plus 1, all 0 in empty pixels, and rast_db
     [N, H, W, 4] with du/dX, du/dY, dv/dX, dv/dY per pixel. Gradients of u, v and rast_db reach pos; z/w has none, as in
     nvdiffrast."""
-    if not isinstance(glctx, _Context):
-        _fail("glctx", type(glctx).__name__, "RasterizeCudaContext() or RasterizeGLContext()", "rasterize", TypeError)
-    _check_pos(pos, "rasterize")
-    _check_tri(tri, pos.shape[-2], "rasterize")
-    height, width = _pixels(resolution)
-    frames = _Frames(glctx.device, pos, tri, _checked_ranges(ranges, pos, tri), height, width, "rasterize")
-    rast, rast_db = frames.rast(pos, grad_db)
-    rast._dpr_frames = frames
-    return rast, rast_db if getattr(glctx, "output_db", True) else rast_db[..., :0]
+    with DepthPeeler(glctx, pos, tri, resolution, ranges, grad_db) as peeler:
+        return peeler.rasterize_next_layer()
+
+
+class DepthPeeler:
+    """Rasterizes layer after layer, from the nearest surfaces to those behind them:
+
+        with dr.DepthPeeler(glctx, pos, tri, resolution) as peeler:
+            for _ in range(4):
+                rast, rast_db = peeler.rasterize_next_layer()
+
+    Arguments are those of rasterize(). antialias() of a layer follows the contours of its surfaces and of those before
+    them. The n-th layer costs about as much as rasterize() with n surfaces at every pixel."""
+
+    def __init__(self, glctx: Union[RasterizeCudaContext, RasterizeGLContext], pos: Tensor, tri: Tensor,
+                 resolution: Sequence[int], ranges: Optional[Tensor] = None, grad_db: bool = True):
+        if not isinstance(glctx, _Context):
+            _fail("glctx", type(glctx).__name__, "RasterizeCudaContext() or RasterizeGLContext()", "rasterize",
+                  TypeError)
+        _check_pos(pos, "rasterize")
+        _check_tri(tri, pos.shape[-2], "rasterize")
+        self._context, self._pos, self._tri, self._grad_db = glctx, pos, tri, grad_db
+        self._size, self._ranges = _pixels(resolution), _checked_ranges(ranges, pos, tri)
+        self._layers = 0
+        self._is_open = False
+
+    def __enter__(self) -> DepthPeeler:
+        self._is_open = True
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._is_open = False
+
+    def rasterize_next_layer(self) -> Tuple[Tensor, Tensor]:
+        """(rast, rast_db) as rasterize() returns them, all 0 where there are fewer surfaces. Raises RuntimeError outside
+        of the with statement."""
+        if not self._is_open:
+            _fail("rasterize_next_layer()", "a call outside of the with statement", "one within it", "DepthPeeler",
+                  RuntimeError)
+        self._layers += 1
+        frames = _Frames(self._context.device, self._pos, self._tri, self._ranges, self._size, "rasterize", self._layers)
+        rast, rast_db = frames.rast(self._pos, self._grad_db)
+        rast._dpr_frames = frames
+        return rast, rast_db if getattr(self._context, "output_db", True) else rast_db[..., :0]
 
 
 def _chosen(diff_attrs, channels):
@@ -385,7 +415,7 @@ def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_ha
               "the tensor that rasterize() returned, or as many shapes in pos", "antialias")
     vertices = known.vertices_of(pos, tri) if known else None
     if vertices is None:
-        device, ranges = (known.device, known.ranges) if known else ("", None)
-        known = _Frames(device, pos, tri, ranges, *rast.shape[1:3], "antialias")
+        device, ranges, layers = (known.device, known.ranges, known.layers) if known else ("", None, 1)
+        known = _Frames(device, pos, tri, ranges, rast.shape[1:3], "antialias", layers)
         vertices = known.vertices_of(pos, tri)
     return known.antialias(color, vertices, float(pos_gradient_boost))
