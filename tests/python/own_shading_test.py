@@ -183,7 +183,7 @@ class OwnShadingTest(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "tangents of values"):
             samples.resolve_with_jvp(values, moved_values[:, 1:])
 
-    @unittest.skipUnless(torch and hasattr(torch, "func"), "no torch.func")
+    @unittest.skipUnless(torch, "no PyTorch")
     def test_forward_mode_of_pytorch(self):
         faces, weights = torch.from_numpy(FACES), torch.from_numpy(WEIGHTS)
         vertices, views, intrinsics, colors = map(torch.from_numpy, (TETRAHEDRON, self.views, self.intrinsics, COLORS))
@@ -195,10 +195,17 @@ class OwnShadingTest(unittest.TestCase):
 
         leaf, color = vertices.clone().requires_grad_(), colors.clone().requires_grad_()
         gradients = torch.autograd.grad((shaded_by(leaf, color) * weights).sum(), (leaf, color))
-        image, tangent = torch.func.jvp(shaded_by, (vertices, colors), (way, colors))
+        if not hasattr(torch, "func"):
+            with torch.autograd.forward_ad.dual_level(), self.assertRaisesRegex(ValueError, "PyTorch before 2.0"):
+                shaded_by(torch.autograd.forward_ad.make_dual(vertices, way), colors)
+            return
+        with torch.autograd.forward_ad.dual_level():
+            duals = map(torch.autograd.forward_ad.make_dual, (vertices, colors), (way, colors))
+            image, tangent = torch.autograd.forward_ad.unpack_dual(shaded_by(*duals))
         self.check_close(image, shaded_by(vertices, colors), 1e-6)
         wanted = float((gradients[0] * way).sum() + (gradients[1] * colors).sum())
         self.assertAlmostEqual(float((tangent * weights).sum()), wanted, delta=1e-4 * abs(wanted))
+
 
         def of_two(numbers):
             return shaded_by(vertices + numbers[0] * way, colors + numbers[1])

@@ -107,8 +107,17 @@ class _Tangents(_Derivative):
         return images.unflatten(0, (info.batch_size, -1)), 0
 
 
+class _OfOneCall(torch.autograd.Function):
+    """One whose arguments are not batched: its derivatives may be."""
+
+    @staticmethod
+    def vmap(info, dimensions, *inputs):
+        raise NotImplementedError("dpr: error: torch.func.vmap (dpr.render): got a batch of arguments, expected a batch of "
+                                  "directions or gradients: a call takes N views, shapes or meshes")
+
+
 @_one_forward
-class _Render(torch.autograd.Function):
+class _Render(_OfOneCall):
     @staticmethod
     def forward(call, *tensors):
         call.rendered = Rendered(call.spec, [_arrays.to_numpy(tensor) for tensor in tensors], call.wanted)
@@ -138,11 +147,6 @@ class _Render(torch.autograd.Function):
         numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
         images = _Tangents.apply(ctx.call, numbers, *(tangents[i][None] for i in numbers), *ctx.saved_tensors)
         return (images[0], *(None for _ in ctx.call.spec.outputs))
-
-    @staticmethod
-    def vmap(info, dimensions, *inputs):
-        raise NotImplementedError("dpr: error: torch.func.vmap (dpr.render): got a batch of arguments, expected a batch of "
-                                  "directions or gradients: a call takes N views, shapes or meshes")
 
 
 @_one_forward
@@ -181,7 +185,7 @@ class _ImageTangents(_Derivative):
 
 
 @_one_forward
-class _Rasterize(torch.autograd.Function):
+class _Rasterize(_OfOneCall):
     """(tensors of a call) to face_id, barycentrics and depth."""
 
     @staticmethod
@@ -204,13 +208,16 @@ class _Rasterize(torch.autograd.Function):
 
     @staticmethod
     def jvp(ctx, _, *tangents):
+        if not _HAS_CONTEXT:
+            _arrays.fail(ValueError, "tangents", "some, with PyTorch before 2.0, which has no outputs without tangents",
+                         "none, or those of Samples.jvp()", "dpr.rasterize")
         numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
         found = _SampleTangents.apply(ctx.call.rendered, numbers, *(tangents[i][None] for i in numbers), *ctx.saved_tensors)
         return (None, *(tangent[0] for tangent in found))
 
 
 @_one_forward
-class _Resolve(torch.autograd.Function):
+class _Resolve(_OfOneCall):
     """(values of the samples, tensors of the call) to images."""
 
     @staticmethod
