@@ -1,0 +1,145 @@
+"""Samples of positions in clip space, for the operations of nvdiffrast."""
+import collections
+
+import torch
+
+from . import _clip_space, _rows, _torch
+from ._renderer import Renderer
+
+_SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
+"""Blends samples across contours over one pixel without a further blur. Only the nearest surface is visible."""
+_PLANE_ROUNDING = 1e-6
+
+
+class _Frame:
+    """Samples of N shapes of one topology.
+
+    faces, first  the triangles, and the index of the first one in tri
+    """
+
+    def __init__(self, device, pos, faces, first, size, call, layers):
+        """pos: [N, V, 4]; size: (height, width). Shows the last of so many layers."""
+        height, width = size
+        self.faces, self.first, self._height, self._width, self._call = faces, first, height, width, call
+        camera, self.vertices = self._placed(pos)
+        renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
+        self._camera = camera
+        views_and_intrinsics = camera.views_and_intrinsics(len(pos), width, height)
+        self._samples = renderer.rasterize(self.vertices, faces, *views_and_intrinsics, layers=layers).layers[-1]
+        self._has_gradient = self.vertices.requires_grad
+
+    def _placed(self, pos):
+        used = torch.zeros(pos.shape[1], dtype=torch.bool)
+        used[self.faces.long().reshape(-1)] = True
+        camera = _clip_space.camera_of(pos, used, "dpr.nvdiffrast." + self._call)
+        return camera, camera.vertices(pos, used, self._width, self._height)
+
+    def _inner(self, samples):
+        margin = self._samples.margin
+        return samples[:, margin:margin + self._height, margin:margin + self._width]
+
+    def rast(self, pos, grad_db):
+        """([N, H, W, 4], [N, H, W, 4])"""
+        samples, faces = self._samples, self.faces.long()
+        face_id, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
+        count = face_id.numel()
+        covered = (face_id >= 0).reshape(-1).nonzero()[:, 0]
+        face = face_id.reshape(-1).index_select(0, covered)
+        shape = covered.div(self._height * self._width, rounding_mode="floor")
+        corners = [corner.contiguous() for corner in
+                   (faces.index_select(0, face) + (shape * pos.shape[1])[:, None]).unbind(1)]
+        weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
+        of_w = pos[..., 3].reshape(-1)
+        if self._camera.is_perspective:
+            own = weights.detach().unbind(1)
+            z, w = (sum(table.index_select(0, corner) * weight for corner, weight in zip(corners, own))
+                    for table in (pos[..., 2].detach().reshape(-1), of_w.detach()))
+            of_depth = z / w
+        else:  # an orthographic camera's weights are linear on the screen
+            of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
+            weights = weights / torch.stack([of_w.index_select(0, corner) for corner in corners], 1)
+            weights = weights / weights.sum(1, keepdim=True)
+        is_seen = of_depth.abs() <= 1 + _PLANE_ROUNDING
+        number = (face + (1 + self.first)).to(pos.dtype)
+        found = torch.cat([weights[:, :2], of_depth[:, None], number[:, None]], 1) * is_seen[:, None]
+        derivatives = self._derivatives(*((pos, weights) if grad_db else (pos.detach(), weights.detach())), corners,
+                                        shape * len(faces) + face)
+        return tuple(_rows.spread(table, covered, count).reshape(*face_id.shape, 4)
+                     for table in (found, derivatives * is_seen[:, None]))
+
+    def _derivatives(self, pos, weights, corners, place):
+        """[K, 4]: du/dX, du/dY, dv/dX, dv/dY per pixel, of weights [K, 3]. place: shape times faces plus face."""
+        table = pos.reshape(-1, 4)
+        if len(pos) * len(self.faces) <= len(place):
+            shapes = torch.arange(len(pos))[:, None, None] * pos.shape[1]
+            slopes = _slopes(_rows.rows(table, (self.faces.long() + shapes).reshape(-1)).reshape(-1, 3, 4))
+            slopes = _rows.rows(slopes, place)
+        else:
+            slopes = _slopes(torch.stack([_rows.rows(table, corner) for corner in corners], 1))
+        of_u, of_v, of_all = slopes.split(2, 1)
+        w = sum(table[:, 3].index_select(0, corner) * weight for corner, weight in zip(corners, weights.unbind(1)))
+        scale = w[:, None] * w.new_tensor([2 / self._width, 2 / self._height])
+        return torch.cat([(own - weight * of_all) * scale for own, weight in zip((of_u, of_v), weights.split(1, 1))], 1)
+
+    def vertices_of(self, pos):
+        """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions,
+        or lack gradients that are wanted."""
+        is_wanted = pos.requires_grad and torch.is_grad_enabled()
+        if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self._has_gradient:
+            return None
+        vertices = self._placed(pos)[1]
+        return vertices if torch.equal(vertices, self.vertices) else None
+
+    def antialias(self, color, vertices, boost):
+        margin = self._samples.margin
+        if boost != 1:
+            vertices = vertices.detach() + boost * (vertices - vertices.detach())
+        tensors = [vertices if tensor is self.vertices else tensor for tensor in self._samples._tensors]
+        around = torch.nn.functional.pad(color.permute(0, 3, 1, 2), (margin,) * 4, mode="replicate").permute(0, 2, 3, 1)
+        return _torch.resolve(self._samples._rasterized, around, tensors)
+
+
+def _slopes(corners):
+    """[R, 6] of corners [R, 3, 4] in clip space: d/dX and d/dY in NDC of u / w, v / w and 1 / w."""
+    places = corners[..., (0, 1, 3)].double()
+    lines = torch.cross(places.roll(-1, 1), places.roll(-2, 1), dim=-1)
+    area = (lines[:, 0] * places[:, 0]).sum(1)
+    slopes = lines[..., :2] / torch.where(area == 0, torch.ones_like(area), area)[:, None, None]
+    return torch.cat([slopes[:, 0], slopes[:, 1], slopes.sum(1)], 1).to(corners.dtype)
+
+
+class Frames:
+    """Frames of one layer of one rasterize() call: one for all images, or with ranges one for each; None for an empty
+    range. layers: as many surfaces as the layer's number, from 1 on."""
+
+    def __init__(self, device, pos, tri, ranges, size, call, layers=1):
+        self.device, self.tri, self.ranges, self.layers, self._size = device, tri, ranges, layers, size
+        pos, ranges = _shapes(pos), [(0, len(tri))] if ranges is None else ranges
+        self._frames = [_Frame(device, pos, tri[first:first + count], first, size, call, layers) if count else None
+                        for first, count in ranges]
+
+    def __reduce__(self):
+        """Copies and pickles of rast have no frames, and are rasterized again."""
+        return collections.OrderedDict, ()
+
+    def rast(self, pos, grad_db):
+        empty = pos.new_zeros(1, *self._size, 4)
+        parts = [(empty, empty) if frame is None else frame.rast(_shapes(pos), grad_db) for frame in self._frames]
+        return tuple(torch.cat(images) if len(images) > 1 else images[0] for images in zip(*parts))
+
+    def vertices_of(self, pos, tri):
+        """Each frame's vertices; None if any frame belongs to other positions."""
+        if tri is not self.tri and not torch.equal(tri.long(), self.tri.long()):
+            return None
+        found = [None if frame is None else frame.vertices_of(_shapes(pos)) for frame in self._frames]
+        return None if any(frame is not None and own is None for frame, own in zip(self._frames, found)) else found
+
+    def antialias(self, color, vertices, boost):
+        colors = [color] if self.ranges is None else color.split(1)
+        images = [part if frame is None else frame.antialias(part, own, boost)
+                  for frame, part, own in zip(self._frames, colors, vertices)]
+        return torch.cat(images) if len(images) > 1 else images[0]
+
+
+def _shapes(pos):
+    return pos if pos.ndim == 3 else pos[None]
