@@ -149,6 +149,14 @@ struct PoseIteration {
   dvec2 radial{0.0};          ///< of the best
 };
 
+/// Why a pose does not count as explaining the target: what leaves little more than it.
+enum class PoseDoubt {
+  none,         ///< nothing: the target is explained
+  wrong_poses,  ///< poses that are wrong: the initial one of descents, the median over rotations of least squares
+  empty_picture,  ///< the background alone, or one colour everywhere
+  other_pose,     ///< another pose that the search has found
+};
+
 /// A pose that was found, and how well it explains the target.
 struct PoseHypothesis {
   Pose pose;
@@ -172,9 +180,12 @@ struct PoseResult : PoseHypothesis {
   /// (bench/experiments/pose/uncertainty.py). It knows nothing of another valley. Empty where the image leaves a
   /// parameter open. LeastSquares only.
   std::vector<double> covariance;
-  unsigned iterations = 0;  ///< of all descents or levels
-  unsigned descent = 0;     ///< the one that found the pose
-  bool explained = false;   ///< see PoseOptions::explained
+  unsigned iterations = 0;                   ///< of all descents or levels
+  unsigned descent = 0;                      ///< the one that found the pose
+  bool explained = false;                    ///< see PoseOptions::explained
+  PoseDoubt doubt = PoseDoubt::wrong_poses;  ///< why not
+  /// The loss in parts of what is left without the pose, which PoseOptions::explained sets a bound.
+  double unexplained_part = 1;
   /// Light found along with the pose: fixed if the scene's own light explains the target.
   PoseLight light = PoseLight::fixed;
   double seconds = 0;

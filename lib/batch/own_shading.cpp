@@ -30,7 +30,7 @@ void require_directions(std::size_t directions) {
 
 dpr_raster Batch::raster() {
   Renderer::Impl& m = impl_of(frame_.renderer());
-  m.require_samples("dpr_frame_raster");
+  m.require_samples("own shading");
   return {static_cast<int>(m.frame.width), static_cast<int>(m.frame.height), m.raster.supersampling,
           m.raster.margin, static_cast<int>(m.layers)};
 }

@@ -53,8 +53,12 @@ int layers_of(const OptionValue& value) {
   constexpr int k_most = 256;  // as Renderer::set_layers() takes them
   const auto* const count = std::get_if<std::int64_t>(&value);
   if (count && *count >= 1 && *count <= k_most) return static_cast<int>(*count);
-  throw InvalidArgument("layers (batch)", count ? std::to_string(*count) : "no whole number",
-                        "1 to " + std::to_string(k_most));
+  const auto* const word = std::get_if<std::string>(&value);
+  throw InvalidArgument("layers (batch)",
+                        count  ? std::to_string(*count)
+                        : word ? '"' + *word + '"'
+                               : checks::text(std::get<double>(value)),
+                        "a whole number from 1 to " + std::to_string(k_most));
 }
 
 /// The modes that a list of words, "repeat,clamp", has.

@@ -112,10 +112,8 @@ void print(const CLI::App& command, const PoseCommandOptions& options, const Pos
   std::printf("%s: loss %.6g after %u iterations, %.1f s\n", options.output.c_str(), result.loss,
               result.iterations, result.seconds);
   if (!result.explained) {
-    std::printf(
-        "The target is not explained: the loss stayed above %s of what wrong poses leave, or a picture "
-        "without the object, or another pose leaves little more. The pose may be wrong%s.\n",
-        command.count("--robust") == 0 ? "a tenth" : "a third", advice(command, options).c_str());
+    std::printf("The target is not explained: %s. The pose may be wrong%s.\n", doubt_text(result).c_str(),
+                advice(command, options).c_str());
   } else if (result.equals.size() > 1) {
     std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
   }

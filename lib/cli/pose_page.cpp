@@ -51,7 +51,7 @@ void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::
     rows.push_back({"uncertainty of the rotation", text});
   if (result.light != PoseLight::fixed) rows.push_back({"light found", name_of(result.light)});
   rows.push_back({"loss", format("%.4g", result.loss)});
-  rows.push_back({"target explained", result.explained ? "yes" : "no"});
+  rows.push_back({"target explained", result.explained ? "yes" : "no: " + doubt_text(result)});
   rows.push_back({"iterations", std::to_string(result.iterations)});
   rows.push_back({"time", format("%.2f seconds", result.seconds)});
   page.add_facts(rows);

@@ -136,6 +136,18 @@ std::span<const std::string_view> light_names() {
 
 std::string name_of(PoseLight light) { return std::string(light_names()[static_cast<std::size_t>(light)]); }
 
+std::string name_of(PoseDoubt doubt) {
+  constexpr std::array<const char*, 4> k_names{"none", "wrong_poses", "empty_picture", "other_pose"};
+  return k_names[static_cast<std::size_t>(doubt)];
+}
+
+std::string doubt_text(const PoseResult& result) {
+  if (result.doubt == PoseDoubt::other_pose) return "another pose leaves little more of it";
+  return format(
+      "%.2g of what %s stays", result.unexplained_part,
+      result.doubt == PoseDoubt::empty_picture ? "a picture without the object leaves" : "wrong poses leave");
+}
+
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet, "step", "of at most");
   return [progress, iterations](const PoseIteration& step) {
@@ -185,6 +197,8 @@ Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& re
   json["height"] = scene.height;
   json["camera"] = camera_with_view(calibrated(scene.camera, result.focal_scale, result.radial));
   json["explained"] = result.explained;
+  if (!result.explained) json["doubt"] = name_of(result.doubt);
+  json["unexplained_part"] = result.unexplained_part;
   json["light"] = name_of(result.light);
   json["iterations"] = result.iterations;
   json["seconds"] = result.seconds;

@@ -19,6 +19,9 @@ namespace dpr::cli {
 /// As --light and pose.json have them, in the order of PoseLight.
 std::span<const std::string_view> light_names();
 std::string name_of(PoseLight light);
+/// As pose.json has it; and what leaves little more than a target that is not explained.
+std::string name_of(PoseDoubt doubt);
+std::string doubt_text(const PoseResult& result);
 
 /// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
 /// must not outlive the returned object's copies.

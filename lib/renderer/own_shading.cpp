@@ -54,12 +54,13 @@ void for_each_group(std::span<const SceneTangent> directions, std::size_t togeth
 void Renderer::Impl::require_samples(const char* caller) {
   require_forward(caller);
   require_whole();
-  const char* const got = !pixel_noise      ? "noise of the triangles"
-                          : scene.lights    ? "a scene with lights"
-                          : geometry_colors ? "colours by geometry"
-                                            : nullptr;
-  if (got)
-    throw InvalidArgument(caller, got, "noise on the pixel (preset \"pixel\") and a scene without lights");
+  if (!pixel_noise)
+    throw InvalidArgument(std::string("noise (") + caller + ")", "that of the triangles",
+                          "noise on the pixel, as the preset \"pixel\" has it");
+  if (scene.lights || geometry_colors)
+    throw InvalidArgument(std::string("lights (") + caller + ")",
+                          scene.lights ? "a scene with lights" : "colours by geometry",
+                          "none: the shading is the caller's");
 }
 
 void Renderer::Impl::find_samples() {
@@ -201,7 +202,7 @@ void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t
   for_each_group(
       directions, tangents_together(directions.size()), [&](auto group, std::size_t first_direction) {
         start_tangents(group, first_direction);
-            own_tangents_.upload(
+        own_tangents_.upload(
             on, sample_tangents.subspan(first_direction * samples.size(), group.size() * samples.size()));
         own_pixels_.resize(on, group.size() * of_direction);
         for (std::size_t first = 0; first < channels; first += 4) {

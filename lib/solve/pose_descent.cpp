@@ -198,6 +198,8 @@ PoseResult descend_to_pose(const Device& device, Scene scene, const Image& targe
       std::tie(result.pose, result.loss, result.descent) = std::tie(found.pose, loss, i);
     }
     result.explained = result.loss < enough;
+    result.doubt = result.explained ? PoseDoubt::none : PoseDoubt::wrong_poses;
+    if (enough > 0) result.unexplained_part = static_cast<double>(options.explained) * result.loss / enough;
     if (found.stopped || result.explained) break;
   }
   return result;

@@ -109,8 +109,13 @@ FittedPose Fit::run(bool anywhere) {
   finish(level, anywhere);
   const double blank = sampled.blank_loss(), unexplained = std::min(wrong_, blank);
   const bool is_robust = method_.robust || (target_.pixels.empty() && !method_.depth.image.pixels.empty());
-  result_.explained =
-      result_.loss < explained_part(options_.explained, is_robust) * unexplained && !is_doubted;
+  if (unexplained > 0) result_.unexplained_part = result_.loss / unexplained;
+  if (result_.loss < explained_part(options_.explained, is_robust) * unexplained) {
+    result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
+  } else {
+    result_.doubt = blank < wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
+  }
+  result_.explained = result_.doubt == PoseDoubt::none;
   return {std::move(result_), normals_, level.scales().color, blank > 0 ? unexplained / blank : 1};
 }
 

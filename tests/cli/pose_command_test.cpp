@@ -96,6 +96,8 @@ TEST_SUITE("pipeline") {
     CHECK(pose["transform"][0][3].get<double>() == doctest::Approx(pose["translation"][0].get<double>()));
     CHECK(pose["loss"].get<double>() < 1e-3);
     CHECK(pose["explained"] == true);
+    CHECK_FALSE(pose.contains("doubt"));
+    CHECK(pose["unexplained_part"].get<double>() < 0.1);
     CHECK(pose["light"] == "fixed");
     CHECK(pose["focal_scale"] == 1.0);
     CHECK(pose["covariance"].size() == 6);
@@ -113,6 +115,28 @@ TEST_SUITE("pipeline") {
       CHECK(contains(page, "src=\"" + std::string(picture) + "\""));
     }
     CHECK_FALSE(contains(page, "http"));  // opens without a network
+  }
+
+  TEST_CASE("dpr pose: says what leaves little more than a target that is not explained") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    json empty = json::parse(folder.read("truth.json"));
+    empty["meshes"][0]["transform"] = {
+        {1, 0, 0, 0}, {0, 1, 0, 100}, {0, 0, 1, 0}, {0, 0, 0, 1}};  // out of sight
+    folder.write("empty.json", empty.dump());
+    REQUIRE(run_line(folder, "render --scene empty.json --preset rigid -o empty.exr --quiet").status == 0);
+    const Outcome solved = run_line(
+        folder,
+        "pose --scene scene.json --target empty.exr --rotations 0 -o pose.json --quiet --report report");
+    CAPTURE(solved.err);
+    REQUIRE(solved.status == 0);
+    const json pose = json::parse(folder.read("pose.json"));
+    CHECK(pose["explained"] == false);
+    CHECK(pose["doubt"] == "empty_picture");
+    CHECK(pose["unexplained_part"].get<double>() > 0.1);
+    CHECK(contains(solved.out, "of what a picture without the object leaves stays"));
+    CHECK(contains(folder.read("report/index.html"), "a picture without the object leaves"));
   }
 
   TEST_CASE("dpr pose: the light that it found explains the target") {

@@ -233,15 +233,54 @@ class OwnShadingTest(unittest.TestCase):
             dpr.rasterize(*self.arguments(), width=SIZE, height=SIZE, preset="gaussian")
         with self.assertRaisesRegex(ValueError, "barycentrics"):
             samples.pullback(barycentrics=np.zeros(3, np.float32))
-        with self.assertRaisesRegex(ValueError, r"attributes .*\[V, C\]"):
-            samples.interpolate(np.zeros(4, np.float32))
+        for rows in (np.zeros(4), np.zeros((3, 2)), np.zeros((5, 2)), np.zeros((3, 4, 2))):
+            with self.assertRaisesRegex(ValueError, r"attributes .*\[V, C\] or \[2, V, C\], V: 4"):
+                samples.interpolate(rows)
+        for faces, words in ((FACES[:1], r"faces .*\[4, 3\]"), (FACES - 1, "attributes .*indices from -1 to 2"),
+                             (FACES + 1, "attributes .*indices from 1 to 4")):
+            with self.assertRaisesRegex(ValueError, words):
+                samples.interpolate(COLORS, faces)
+        with self.assertRaisesRegex(ValueError, r"values .*expected \[2, [0-9]+, [0-9]+, C\]"):
+            samples.resolve(samples.depth)
+        with self.assertRaisesRegex(TypeError, "values .*got str"):
+            samples.resolve("depth")
+        for call in (RENDERER.rasterize, lambda *given, **named: dpr.rasterize(*given, width=SIZE, height=SIZE, **named)):
+            with self.assertRaisesRegex(TypeError, "did you mean 'layers'"):
+                call(*self.arguments(), layer=2)
+        with self.assertWarnsRegex(UserWarning, "every triangle was dropped"):
+            RENDERER.rasterize(*self.arguments(TETRAHEDRON + np.float32([0, 0, 100])))
         for layers in (0, 257, 1.5, "many"):
-            with self.assertRaisesRegex(ValueError, "layers .*1 to 256"):
+            with self.assertRaisesRegex(ValueError, "layers .*from 1 to 256"):
                 RENDERER.rasterize(*self.arguments(), layers=layers)
         with self.assertRaisesRegex(ValueError, "layers"):
             dpr.Renderer(SIZE, SIZE, layers=2)
         with self.assertRaisesRegex(ValueError, "2 meshes"):
             dpr.rasterize([TETRAHEDRON, TETRAHEDRON], [FACES, FACES], self.views, self.intrinsics, width=SIZE, height=SIZE)
+
+    @unittest.skipUnless(torch, "no PyTorch")
+    def test_what_is_refused_of_tensors(self):
+        plain = [torch.from_numpy(array) for array in self.arguments()]
+        samples = RENDERER.rasterize(*plain)
+        with self.assertRaisesRegex(ValueError, "tangents of vertices .*required no gradient"):
+            samples.jvp({"vertices": torch.ones(1, 4, 3)})
+        with self.assertRaisesRegex(ValueError, "pullback.. .*without gradients"):
+            samples.pullback(depth=samples.depth)
+        by_numpy = samples.resolve(samples.depth[..., None].numpy())
+        self.assertTrue(torch.equal(by_numpy, samples.resolve(samples.depth[..., None])))
+        self.assertTrue(torch.equal(samples.interpolate(COLORS), samples.interpolate(torch.from_numpy(COLORS))))
+        of_numpy = RENDERER.rasterize(*self.arguments())
+        leaf = torch.from_numpy(COLORS.copy()).requires_grad_()
+        for call in (of_numpy.interpolate, of_numpy.resolve):
+            with self.assertRaisesRegex(ValueError, "requires a gradient"):
+                call(leaf)
+        vertices = plain[0].clone().requires_grad_()
+        for of in ("barycentrics", "contours"):
+            samples = RENDERER.rasterize(vertices, *plain[1:])
+            values = samples.interpolate(vertices)
+            loss = values.square().sum() if of == "barycentrics" else samples.resolve(values.detach()).square().sum()
+            gradient, = torch.autograd.grad(loss, vertices, create_graph=True)
+            with self.assertRaisesRegex(RuntimeError, "second"):
+                torch.autograd.grad(gradient.square().sum(), vertices)
 
     def test_a_process_ends_while_its_driver_compiles(self):
         program = ("import numpy as np, dpr\n"

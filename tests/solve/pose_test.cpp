@@ -491,14 +491,20 @@ TEST_SUITE("robustness") {
           method.light = light;
           const dpr::Image target(size, size, glm::vec4(glm::vec3(grey), 1));
           const dpr::PoseSolver solver(device, scene, target, {.method = method, .solve_translation = true});
-          CHECK_FALSE(solver.search().explained);
+          const dpr::PoseResult found = solver.search();
+          CHECK_FALSE(found.explained);
+          CHECK(found.doubt != dpr::PoseDoubt::none);
+          // All of what an empty picture leaves stays, or more: nothing of the target is explained.
+          if (height > 0) CHECK(found.unexplained_part >= 0.9);
         }
       }
     }
     dpr::Scene far = cube_scene(size);
     far.meshes.front().transform[3] = glm::vec4(0, 100, 0, 1);
     const dpr::PoseSolver solver(device, far, dpr::Image(size, size, glm::vec4(0)), descent(1));
-    CHECK_FALSE(solver.solve(solver.scene_pose()).explained);
+    const dpr::PoseResult descended = solver.solve(solver.scene_pose());
+    CHECK_FALSE(descended.explained);
+    CHECK(descended.doubt == dpr::PoseDoubt::wrong_poses);
   }
 }
 

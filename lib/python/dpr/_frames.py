@@ -11,7 +11,7 @@ from . import _arrays, _library
 WITH_GRADIENTS = {"depth": 1, "position": 3, "normal": 3, "texcoords": 2}
 """Outputs with gradients, and how many numbers a pixel of theirs has."""
 OTHERS = {"face_id": (), "barycentrics": (3,), "uv": (2,), "effective_faces": ()}
-_NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer than znear, beyond zfar, culled, or without "
+NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer than znear, beyond zfar, culled, or without "
                      "area")
 _OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
 """Arrays that outputs beside the image depend on."""
@@ -147,7 +147,7 @@ def _faces_beyond(zfar, vertices, faces, views):
 
 def _warning(frame, zfar, arrays):
     if frame.is_empty():
-        return _NOTHING_RENDERED
+        return NOTHING_RENDERED
     count = _faces_beyond(zfar, arrays["vertices"], arrays["faces"], arrays["views"]) if zfar is not None else 0
     return f"dpr: {count} triangles reach beyond zfar ({zfar:g}) and were dropped whole" if count else None
 

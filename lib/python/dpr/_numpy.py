@@ -60,9 +60,10 @@ def tangents_of_leaves(plan, tangents):
         if _arrays.type_of(leaf) != "float32":
             _arrays.fail(ValueError, name, "some", "none: indices stay")
         tangent = _arrays.to_numpy(_arrays.converted(name, tangent))
-        count = count if tangent.ndim == 0 or count is not None else len(tangent)
+        if count is None and tangent.ndim == 1 + len(given.shape):
+            count = len(tangent)
         if tangent.shape != (count, *given.shape) or not count:
-            _arrays.fail(ValueError, name, list(tangent.shape), [count or "K", *given.shape])
+            _arrays.fail(ValueError, name, list(tangent.shape), f"[{', '.join(map(str, (count or 'K', *given.shape)))}]")
         if leaf.shape != given.shape:
             tangent = np.repeat(tangent, leaf.shape[0], 1)
         found[number] = tangent * plan.slopes[number]() if number in plan.slopes else tangent

@@ -59,6 +59,14 @@ def setting(name, value):
     return f"{name}={value}"
 
 
+def pixels(name, value):
+    if not isinstance(value, numbers.Real):
+        fail(TypeError, name, repr(value), "a whole number of pixels")
+    if not value % 1 == 0:
+        fail(_library.InvalidArgument, name, value, "a whole number of pixels")
+    return int(value)
+
+
 def require_names(given, known):
     """Fails for a keyword that there is not, and tells the nearest."""
     for name in given:

@@ -2,7 +2,6 @@
 from __future__ import annotations
 
 import inspect
-import numbers
 import types
 import warnings
 from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
@@ -57,7 +56,7 @@ class Renderer:
                  if value is not None}
         if "sigma" in given and "blur" in given:
             _arrays.fail(ValueError, "blur", "blur and sigma", "one of them")
-        width, height = (_pixels(name, given.pop(name)) for name in ("width", "height"))
+        width, height = (_plan.pixels(name, given.pop(name)) for name in ("width", "height"))
         device, texts = given.pop("device", ""), []
         has_blur = "sigma" in given or "blur" in given or given.get("preset") != "pixel"
         for name, value in (given if has_blur else {**given, "blur": _DEFAULT_BLUR}).items():
@@ -226,10 +225,10 @@ class Renderer:
         return _result(spec, found, warning), pullback
 
     def rasterize(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *, layers: int = 1,
-                  copy: bool = False) -> Samples:
+                  copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
-        The arguments are those of a call, of one mesh or N shapes of it; of NumPy, PyTorch, or any library with DLPack.
+        The arguments are those of a call, of one mesh or N shapes of it; of NumPy, PyTorch, or any library with DLPack but JAX.
         layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
@@ -243,6 +242,13 @@ class Renderer:
             normals = samples.interpolate(vertex_normals)
             image = samples.resolve(my_shader(normals))  # [N, height, width, C]
         """
+        _plan.require_names(misspelt, ("layers", "copy"))
+        samples = self._rasterize(vertices, faces, views, intrinsics, layers, copy)
+        if samples.warning:
+            warnings.warn(samples.warning, stacklevel=2)
+        return samples
+
+    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):
         spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy})
         spec = spec._replace(settings=(*spec.settings, _plan.setting("layers", layers)))
         return _samples.rasterize(spec, plan, copy)
@@ -308,14 +314,6 @@ def _checked(name, value):
     return False
 
 
-def _pixels(name, value):
-    if not isinstance(value, numbers.Real):
-        _arrays.fail(TypeError, name, repr(value), "a whole number of pixels")
-    if not value % 1 == 0:
-        _arrays.fail(_library.InvalidArgument, name, value, "a whole number of pixels")
-    return int(value)
-
-
 _DEFAULT_BLUR = 1  # pixels, of the preset "pixel"
 _DEFAULTS = Renderer.__call__.__kwdefaults__
 _OF_A_CALL = tuple(_DEFAULTS)
@@ -359,6 +357,7 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
 def rasterize(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
               copy: bool = False, **settings: Setting) -> Samples:
     """Renderer(width, height, **settings).rasterize(): see there."""
+    _plan.require_names(settings, (*_OF_A_RENDERER, "layers", "copy"))
     return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, layers=layers, copy=copy)
 
 
@@ -389,6 +388,7 @@ _setting_keywords = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, ann
 _call_keywords = _keywords_of(Renderer.__call__)
 _sign(Renderer.__init__, *_setting_keywords)
 _sign(Renderer.__call__)
+_sign(Renderer.rasterize)
 _sign(Renderer.jvp, *_call_keywords)
 _sign(Renderer.vjp, *_call_keywords)
 _all_keywords = {parameter.name: parameter for parameter in (*_setting_keywords, *_call_keywords)}

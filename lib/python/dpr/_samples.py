@@ -24,12 +24,14 @@ class Rasterized:
         (settings, parts), = _frames.frames_of(spec.parts)
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
         self._parts = [part for part in parts if part.leaf in wanted]
+        self.leaves = [part.leaf for part in self._parts]  # those with derivatives
         self._shapes = [array.shape for array in arrays]
         named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
         if not any(part.name == "faces" for part in parts):
             named += _frames.NO_MESH
         options = _frames.options_of(spec, settings, 0, [part.name for part in self._parts])
         self._frame = _frames.Frame(options, named)
+        self.warning = _frames.NOTHING_RENDERED if self._frame.is_empty() else None
         self.raster = _library.Raster()
         _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
         count = next(len(array) for name, array in named if name == "views")
@@ -61,7 +63,7 @@ class Rasterized:
         return self.gradients(whole)
 
     def resolve(self, values):
-        values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim else 0))
+        values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim == 4 else 0))
         images = np.empty((*self._image_size, values.shape[-1]), np.float32)
         _library.call("dpr_frame_resolve", self._frame.handle, _one("values", values), _one("images", images))
         return images
@@ -116,8 +118,12 @@ def _checked(name, array, shape):
     """Packed floats. Fails for another shape."""
     array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
     if array.shape != shape or not array.size:
-        _arrays.fail(ValueError, name, list(array.shape), ["C" if size == 0 else size for size in shape], "dpr.Samples")
+        _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")
     return array
+
+
+def _kept(values, name="values"):
+    return np.array(_arrays.to_numpy(_arrays.converted(name, _arrays.from_numbers(values), where="dpr.Samples")), np.float32)
 
 
 class Samples:
@@ -125,11 +131,19 @@ class Samples:
 
     face_id        [N, h, w], int64: the layer's face, -1 where nothing is
     barycentrics   [N, h, w, 3] of that face's corners, with perspective; 0 where nothing is
-    depth          [N, h, w] along the view direction, world units; 0 where nothing is
+    depth          [N, h, w] along the view direction, world units; 0 where nothing is. These three are of one layer: of
+                   the nearest surfaces, unless this is one of `layers`
     supersampling  samples a pixel and axis; margin: samples around the image, so that h = height supersampling + 2 margin
 
     With PyTorch barycentrics, depth and what is made of them have derivatives by vertices, views and intrinsics; with other
-    arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and resolve_with_jvp().
+    arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and resolve_with_jvp(). Without PyTorch a
+    gradient goes back like this:
+
+        corners = colors[faces[samples.face_id.clip(0)]]  # [N, h, w, 3, C]
+        image, resolved = samples.resolve_with_vjp((samples.barycentrics[..., None] * corners).sum(-2))  # interpolate()
+        grad_values, by_contours = resolved(grad_image)
+        inside = samples.pullback(barycentrics=(corners * grad_values[..., None, :]).sum(-1))
+        gradient = by_contours["vertices"] + inside["vertices"]
     """
 
     face_id: Array
@@ -142,7 +156,9 @@ class Samples:
         self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
         self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
+        self.warning = rasterized.warning  # of a frame that shows nothing
         self._outputs = outputs
+        self._vertices = next(array.shape[-2] for path, array in zip(plan.paths, plan.given) if path == ("vertices",))
 
     @property
     def layers(self) -> Tuple[Samples, ...]:
@@ -157,22 +173,41 @@ class Samples:
 
     def interpolate(self, attributes: Array, faces: Optional[Array] = None) -> Array:
         """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3]
-        indices of the attributes for the corners of the mesh's faces, where they have some of their own."""
-        faces = self._faces if faces is None else faces
-        corners = faces[self.face_id.clip(0)]
-        if len(attributes.shape) == 2:
-            values = attributes[corners]
-        elif len(attributes.shape) == 3:
-            values = attributes[np.arange(len(attributes))[:, None, None, None], corners]
-        else:
-            _arrays.fail(ValueError, "attributes", list(attributes.shape), "[V, C] or [N, V, C]", "dpr.Samples")
+        indices of the attributes for the corners of the mesh's faces, where they have some of their own. Raises ValueError
+        for other shapes and indices."""
+        attributes = self._of_my_kind("attributes", attributes)
+        rows, least = self._vertices, 0
+        if faces is not None:
+            faces = _arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.Samples")
+            if tuple(faces.shape) != tuple(self._faces.shape):
+                _arrays.fail(ValueError, "faces", list(faces.shape), list(self._faces.shape), "dpr.Samples")
+            rows, least = int(faces.max()) + 1, int(faces.min())
+        shape, count = tuple(attributes.shape), len(self.face_id)
+        is_table = len(shape) == 2 or len(shape) == 3 and shape[0] in (1, count)
+        if not is_table or least < 0 or shape[-2] < rows or faces is None and shape[-2] != rows:
+            wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
+            _arrays.fail(ValueError, "attributes", list(shape), f"[V, C] or [{count}, V, C], V: {wanted}", "dpr.Samples")
+        corners = (self._faces if faces is None else faces)[self.face_id.clip(0)]
+        values = attributes[corners] if len(shape) == 2 else \
+            attributes[np.arange(len(attributes))[:, None, None, None], corners]
         return (self.barycentrics[..., None] * values).sum(-2)
+
+    def _of_my_kind(self, name, array):
+        """Floats, as tensors if the samples are. Fails for a tensor whose gradient would be lost."""
+        array = _arrays.converted(name, _arrays.from_numbers(array), where="dpr.Samples")
+        if self._tensors is not None:
+            return array if _arrays.module_of(array) == "torch" else sys.modules["torch"].from_dlpack(_arrays.to_numpy(array))
+        if getattr(array, "requires_grad", False):
+            _arrays.fail(ValueError, name, "a tensor that requires a gradient", "an array without, as rasterize() was given no "
+                         "tensors: resolve_with_vjp() and pullback() have gradients", "dpr.Samples")
+        return _arrays.to_numpy(array) if isinstance(self.barycentrics, np.ndarray) else array
 
     def resolve(self, values: Array) -> Array:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
-        the background's. It does not matter which layer's this is: contours count unless as many surfaces as there are
-        layers hide them. Raises ValueError for another shape, and what is not finite."""
+        the background's. Contours count that fewer surfaces hide than there are layers: whichever layer's resolve() is
+        called. Raises ValueError for another shape, and what is not finite."""
+        values = self._of_my_kind("values", values)
         if self._tensors is not None:
             from . import _torch
             return _torch.resolve(self._rasterized, values, self._tensors)
@@ -180,8 +215,8 @@ class Samples:
 
     def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
         """(resolve(values), pullback). pullback(grad_images) returns the gradient of the values and, by way of the
-        contours, those of vertices, views and intrinsics, by name."""
-        kept = np.array(_arrays.to_numpy(values), np.float32)
+        contours, those of vertices, views and intrinsics, by name; of tensors, of those that required a gradient."""
+        kept = _kept(values)
 
         def pullback(grad_images):
             grad_values, found = self._rasterized.resolve_gradients(kept, _arrays.to_numpy(grad_images))
@@ -191,15 +226,21 @@ class Samples:
 
     def pullback(self, barycentrics: Optional[Array] = None, depth: Optional[Array] = None) -> Dict[str, Array]:
         """Gradients of vertices, views and intrinsics, by name, from those of barycentrics and depth. They leave out how
-        contours move, which resolve_with_vjp() has: add up both."""
+        contours move, which resolve_with_vjp() has: add up both, and those of other layers. Of tensors, those that required
+        a gradient when rasterize() was called have one."""
+        if not self._rasterized.leaves:
+            _arrays.fail(ValueError, "pullback()", "samples of tensors without gradients", "a tensor that requires one",
+                         "dpr.Samples")
         grads = {"barycentrics": barycentrics, "depth": depth}
         return self._by_name(self._rasterized.gradients_of_layer(self._layer, grads))
 
     def jvp(self, tangents: Dict[str, Array]) -> Tuple[Array, Array]:
         """Tangents of barycentrics [K, N, h, w, 3] and depth [K, N, h, w] along K directions at once: forward mode.
 
-        tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape]. PyTorch
-        takes its own by torch.func.jvp and torch.autograd.forward_ad."""
+        tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape]; of
+        tensors, of those that required a gradient when rasterize() was called. PyTorch takes its own by torch.func.jvp and
+        torch.autograd.forward_ad, from 2.0 on. The tangent of interpolate(attributes) is interpolate(those of the
+        attributes), plus the attributes of the faces' corners times those of the barycentrics."""
         count, given = self._moving(tangents)
         found = self._rasterized.tangents(count, given)
         return tuple(_arrays.like(self._plan.given[0], tangent[:, self._layer]) for tangent in found)
@@ -209,7 +250,9 @@ class Samples:
         """(resolve(values), its tangents [K, N, height, width, C]) along K directions, in which the values change by
         value_tangents [K, *values.shape], and by way of the contours, vertices, views and intrinsics by `tangents` as
         jvp() takes them; of both, those left out stay."""
-        kept = np.array(_arrays.to_numpy(values), np.float32)
+        kept = _kept(values)
+        if value_tangents is not None:
+            value_tangents = _kept(value_tangents, "tangents of values")
         if value_tangents is None and tangents is None:
             _arrays.fail(ValueError, "tangents", "none", "those of the values, or of one array at least", "dpr.Samples")
         count, given = (len(value_tangents), {}) if tangents is None else self._moving(tangents)
@@ -219,6 +262,10 @@ class Samples:
     def _moving(self, tangents):
         """(K, {leaf: tangents})"""
         given = _numpy.tangents_of_leaves(self._plan, tangents)
+        for leaf in given:
+            if leaf not in self._rasterized.leaves:
+                _arrays.fail(ValueError, f"tangents of {self._plan.paths[leaf][0]}", "some", "none: the tensor required no "
+                             "gradient when rasterize() was called", "dpr.Samples")
         return len(next(iter(given.values()))), given
 
     def _by_name(self, found):

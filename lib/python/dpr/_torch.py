@@ -6,7 +6,6 @@ import weakref
 import numpy as np
 import torch
 from torch.autograd import forward_ad
-from torch.autograd.function import once_differentiable
 
 from . import _arrays, _frames
 from ._frames import Rendered, Spec
@@ -185,6 +184,26 @@ class _ImageTangents(_Derivative):
 
 
 @_one_forward
+class _SampleGradients(_Derivative):
+    """(gradients of barycentrics and depth, all tensors) to those of the wanted tensors."""
+
+    @staticmethod
+    def forward(call, grad_barycentrics, grad_depth, *tensors):
+        found = call.rendered.gradients({"barycentrics": grad_barycentrics, "depth": grad_depth})
+        return tuple(_tensor(found[i]) for i in call.wanted)
+
+
+@_one_forward
+class _ResolveGradients(_Derivative):
+    """(gradient of the images, the values, all tensors) to those of the values and of the wanted tensors."""
+
+    @staticmethod
+    def forward(rasterized, grad_images, values, *tensors):
+        grad_values, found = rasterized.resolve_gradients(_arrays.to_numpy(values), _arrays.to_numpy(grad_images))
+        return tuple(_tensor(array) for array in (grad_values, *(found[i] for i in rasterized.leaves)))
+
+
+@_one_forward
 class _Rasterize(_OfOneCall):
     """(tensors of a call) to face_id, barycentrics and depth."""
 
@@ -196,15 +215,15 @@ class _Rasterize(_OfOneCall):
     @staticmethod
     def setup_context(ctx, inputs, outputs):
         ctx.call, *tensors = inputs
-        ctx.count = len(tensors)
+        ctx.save_for_backward(*tensors)
         ctx.save_for_forward(*tensors)
         ctx.mark_non_differentiable(outputs[0])
 
     @staticmethod
-    @once_differentiable
-    def backward(ctx, _, grad_barycentrics, grad_depth):
-        found = ctx.call.rendered.gradients({"barycentrics": grad_barycentrics, "depth": grad_depth})
-        return (None, *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
+    def backward(ctx, _, *grads):
+        tensors = ctx.saved_tensors
+        found = dict(zip(ctx.call.wanted, _SampleGradients.apply(ctx.call, *grads, *tensors)))
+        return (None, *(found.get(i) for i in range(len(tensors))))
 
     @staticmethod
     def jvp(ctx, _, *tangents):
@@ -226,17 +245,16 @@ class _Resolve(_OfOneCall):
 
     @staticmethod
     def setup_context(ctx, inputs, outputs):
-        ctx.rasterized, values, *tensors = inputs
-        ctx.count = len(tensors)
-        ctx.save_for_backward(values)
-        ctx.save_for_forward(values, *tensors)
+        ctx.rasterized, *tensors = inputs
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
 
     @staticmethod
-    @once_differentiable
     def backward(ctx, grad_images):
-        values, = ctx.saved_tensors
-        grad_values, found = ctx.rasterized.resolve_gradients(_arrays.to_numpy(values), _arrays.to_numpy(grad_images))
-        return (None, _tensor(grad_values), *(_tensor(found[i]) if i in found else None for i in range(ctx.count)))
+        tensors = ctx.saved_tensors
+        grad_values, *found = _ResolveGradients.apply(ctx.rasterized, grad_images, *tensors)
+        found = dict(zip(ctx.rasterized.leaves, found))
+        return (None, grad_values, *(found.get(i) for i in range(len(tensors) - 1)))
 
     @staticmethod
     def jvp(ctx, _, moved, *tangents):
