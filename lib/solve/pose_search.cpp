@@ -113,7 +113,7 @@ FittedPose Fit::run(bool anywhere) {
   if (result_.loss < explained_part(options_.explained, is_robust) * unexplained) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
   } else {
-    result_.doubt = blank < wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
+    result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
   }
   result_.explained = result_.doubt == PoseDoubt::none;
   return {std::move(result_), normals_, level.scales().color, blank > 0 ? unexplained / blank : 1};

@@ -127,8 +127,7 @@ TEST_SUITE("pipeline") {
     folder.write("empty.json", empty.dump());
     REQUIRE(run_line(folder, "render --scene empty.json --preset rigid -o empty.exr --quiet").status == 0);
     const Outcome solved = run_line(
-        folder,
-        "pose --scene scene.json --target empty.exr --rotations 0 -o pose.json --quiet --report report");
+        folder, "pose --scene scene.json --target empty.exr --rotations 0 -o pose.json --report report");
     CAPTURE(solved.err);
     REQUIRE(solved.status == 0);
     const json pose = json::parse(folder.read("pose.json"));
