@@ -184,7 +184,7 @@ struct PoseResult : PoseHypothesis {
   unsigned descent = 0;                      ///< the one that found the pose
   bool explained = false;                    ///< see PoseOptions::explained
   PoseDoubt doubt = PoseDoubt::wrong_poses;  ///< why not
-  /// The loss in parts of what is left without the pose, which PoseOptions::explained sets a bound.
+  /// The loss in parts of what is left without the pose: PoseOptions::explained has the bound.
   double unexplained_part = 1;
   /// Light found along with the pose: fixed if the scene's own light explains the target.
   PoseLight light = PoseLight::fixed;

@@ -12,6 +12,7 @@
 #include "dpr/error.hpp"
 #include "image/texture_words.hpp"
 #include "renderer/depth_range.hpp"
+#include "renderer/setter_checks.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
 
@@ -50,15 +51,14 @@ Cull cull_value(const OptionValue& value) {
 }
 
 int layers_of(const OptionValue& value) {
-  constexpr int k_most = 256;  // as Renderer::set_layers() takes them
+  constexpr const char* k_where = "layers (batch)";
   const auto* const count = std::get_if<std::int64_t>(&value);
-  if (count && *count >= 1 && *count <= k_most) return static_cast<int>(*count);
   const auto* const word = std::get_if<std::string>(&value);
-  throw InvalidArgument("layers (batch)",
-                        count  ? std::to_string(*count)
-                        : word ? '"' + *word + '"'
-                               : checks::text(std::get<double>(value)),
-                        "a whole number from 1 to " + std::to_string(k_most));
+  if (!count)
+    throw InvalidArgument(k_where, word ? '"' + *word + '"' : checks::text(std::get<double>(value)),
+                          "a whole number");
+  check_layers(*count, k_where);
+  return static_cast<int>(*count);
 }
 
 /// The modes that a list of words, "repeat,clamp", has.

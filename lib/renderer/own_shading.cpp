@@ -5,6 +5,7 @@
 
 #include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 
 namespace dpr {
@@ -225,10 +226,7 @@ void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t
 }
 
 void Renderer::set_layers(int count) {
-  constexpr int k_most_layers = 256;
-  if (count < 1 || count > k_most_layers)
-    throw InvalidArgument("count (Renderer::set_layers)", std::to_string(count),
-                          "1 to " + std::to_string(k_most_layers));
+  check_layers(count, "count (Renderer::set_layers)");
   impl_->set_layers(static_cast<cl_uint>(count));
 }
 

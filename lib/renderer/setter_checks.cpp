@@ -13,6 +13,13 @@ View own_view(const Scene& scene) {
   return view;
 }
 
+void check_layers(std::int64_t count, const std::string& argument) {
+  constexpr std::int64_t k_most = 256;
+  if (count < 1 || count > k_most)
+    throw InvalidArgument(argument, std::to_string(count),
+                          "a whole number from 1 to " + std::to_string(k_most));
+}
+
 void check_devices(std::span<const Device> devices) {
   if (devices.empty()) throw InvalidArgument("devices", "none", "at least one");
   for (std::size_t d = 0; d < devices.size(); ++d) {

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "device/opencl_bindings.hpp"
@@ -14,6 +16,9 @@ namespace dpr {
 
 /// The view of a scene's own camera and transforms.
 View own_view(const Scene& scene);
+
+/// Throws InvalidArgument for another number of layers than Renderer::set_layers() takes.
+void check_layers(std::int64_t count, const std::string& argument);
 
 /// Throws InvalidArgument if there is no device, or the same Device twice: each needs a queue of its own.
 void check_devices(std::span<const Device> devices);

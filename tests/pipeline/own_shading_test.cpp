@@ -452,7 +452,10 @@ TEST_SUITE("pipeline") {
       const SceneGradient gradient = renderer.backward_pixels(weights.of_images);
       const Samples samples = renderer.samples();
       const std::vector<float> values(samples.faces.size() / static_cast<std::size_t>(layers), 1.0F);
-      renderer.resolve(values, 1);
+      const std::vector<float> pixels = renderer.resolve(values, 1);
+      renderer.resolve_backward(values, 1, pixels);
+      renderer.samples_backward(samples.barycentrics, samples.depths);
+      renderer.resolve_tangent(values, 1, values, std::vector<SceneTangent>(1));
       CHECK(pipeline::same_bits(renderer.image(), image));
       CHECK(pipeline::same_bits(renderer.backward_pixels(weights.of_images), gradient));
     }
@@ -462,8 +465,8 @@ TEST_SUITE("pipeline") {
     Scene scene = check::scene_of(make_cube(), 12, 9);
     scene.smoothing = smoothing_preset("pixel");
     Renderer renderer(open_device());
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_layers(0), "1 to 256");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_layers(257), "1 to 256");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_layers(0), "from 1 to 256");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_layers(257), "from 1 to 256");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.samples(), "Renderer::samples");
     renderer.set_scene(scene);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.samples(), "forward() first");

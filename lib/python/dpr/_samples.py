@@ -156,7 +156,7 @@ class Samples:
         self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
         self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
-        self.warning = rasterized.warning  # of a frame that shows nothing
+        self._warning = rasterized.warning  # of a frame that shows nothing
         self._outputs = outputs
         self._vertices = next(array.shape[-2] for path, array in zip(plan.paths, plan.given) if path == ("vertices",))
 
