@@ -42,12 +42,13 @@ FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_
   return {packed.cl_buffer()(), first, channels, std::min<std::size_t>(channels - first, 4)};
 }
 
-/// Groups of a list, each of so many at most: function(group, index of its first).
+/// Calls a function while the rasterizer holds the fragments of each band of a frame.
 template <class Function>
-void for_each_group(std::span<const SceneTangent> directions, std::size_t together,
-                    const Function& function) {
-  for (std::size_t first = 0; first < directions.size(); first += together)
-    function(directions.subspan(first, std::min(together, directions.size() - first)), first);
+void for_each_band(Renderer::Impl& m, const Function& function) {
+  for (const Band& band : m.bands) {
+    if (m.bands.size() > 1) m.rasterize.forward(m.frame, m.setup.triangles, m.bin, band);
+    function();
+  }
 }
 
 }  // namespace
@@ -66,19 +67,14 @@ void Renderer::Impl::require_samples(const char* caller) {
 
 void Renderer::Impl::find_samples() {
   if (!surface_samples) surface_samples.emplace(impl_of(device));
-  for (const Band& band : bands) {
-    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
-    surface_samples->forward(frame, bin, rasterize, layers);
-  }
+  for_each_band(*this, [&] { surface_samples->forward(frame, bin, rasterize, layers); });
 }
 
 /// Finds the contours' crossings again, as they are seen through all but the last of so many layers.
 void Renderer::Impl::see_layers(cl_uint count) {
   if (count == seen_layers_) return;
-  for (const Band& band : bands) {
-    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
-    pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, count);
-  }
+  for_each_band(
+      *this, [&] { pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, count); });
   pixel_noise->antialias.cross(contour_inputs(), pixel_noise->contour);
   seen_layers_ = count;
 }
@@ -95,11 +91,10 @@ SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_p
   const GeometricRequest request(scene.gradients);
   own_group_.upload(impl_of(device), grad_places);
   if (!surface_samples) surface_samples.emplace(impl_of(device));
-  for (const Band& band : bands) {
-    if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+  for_each_band(*this, [&] {
     surface_samples->backward(frame, own_group_, layers, rasterize);
     rasterize.backward(frame, setup.triangles, bin);
-  }
+  });
   gather.per_view(frame, geometry->vertices, bin, geometry->vertex_corners, rasterize.grad_corners,
                   grad_vertices);
   if (frame.clips != 0)
@@ -174,15 +169,12 @@ SamplesTangent Renderer::Impl::samples_tangent(std::span<const SceneTangent> dir
   found.barycentrics.reserve(directions.size() * samples);
   found.depths.reserve(directions.size() * samples);
   if (!surface_samples) surface_samples.emplace(impl_of(device));
-  const std::size_t together = tangents_together(directions.size());
-  cut_for_tangents(together);
-  for_each_group(directions, together, [&](std::span<const SceneTangent> group, std::size_t first) {
-    start_tangents(group, first);
-    for (const Band& band : bands) {
-      if (bands.size() > 1) rasterize.forward(frame, setup.triangles, bin, band);
+  cut_for_tangents(tangents_together(directions.size()));
+  move_in_groups(directions, [&](std::size_t, std::size_t) {
+    for_each_band(*this, [&] {
       rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
       surface_samples->tangent(frame, rasterize, layers, tangents);
-    }
+    });
     for (const cl_float4& place : surface_samples->moved.download()) {
       found.barycentrics.emplace_back(place.s[0], place.s[1]);
       found.depths.push_back(place.s[2]);
@@ -200,29 +192,27 @@ void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t
                     of_direction = pixels.size() / directions.size(), pixel_count = of_direction / channels;
   own_samples_.upload(on, samples);
   own_group_.resize(on, sample_count);
-  for_each_group(
-      directions, tangents_together(directions.size()), [&](auto group, std::size_t first_direction) {
-        start_tangents(group, first_direction);
-        own_tangents_.upload(
-            on, sample_tangents.subspan(first_direction * samples.size(), group.size() * samples.size()));
-        own_pixels_.resize(on, group.size() * of_direction);
-        for (std::size_t first = 0; first < channels; first += 4) {
-          made_exchange().give(group_of(own_samples_, first, channels), sample_count,
-                               vectors_of(own_group_, 0, 4));
-          pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
-          for (std::size_t d = 0; d < group.size(); ++d) {
-            FloatVectors from = group_of(own_tangents_, first, channels),
-                         to = group_of(own_pixels_, first, channels);
-            from.first += d * samples.size();
-            to.first += d * of_direction;
-            made_exchange().give(from, sample_count, vectors_of(own_group_, 0, 4));
-            pixel_noise->smooth_tangent(contour_inputs(), image_size(), d, tangents, own_group_, own_image_,
-                                        aggregate.scratch(frame));
-            made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
-          }
-        }
-        own_pixels_.download(pixels.subspan(first_direction * of_direction, group.size() * of_direction));
-      });
+  move_in_groups(directions, [&](std::size_t first_direction, std::size_t count) {
+    own_tangents_.upload(on,
+                         sample_tangents.subspan(first_direction * samples.size(), count * samples.size()));
+    own_pixels_.resize(on, count * of_direction);
+    for (std::size_t first = 0; first < channels; first += 4) {
+      made_exchange().give(group_of(own_samples_, first, channels), sample_count,
+                           vectors_of(own_group_, 0, 4));
+      pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
+      for (std::size_t d = 0; d < count; ++d) {
+        FloatVectors from = group_of(own_tangents_, first, channels),
+                     to = group_of(own_pixels_, first, channels);
+        from.first += d * samples.size();
+        to.first += d * of_direction;
+        made_exchange().give(from, sample_count, vectors_of(own_group_, 0, 4));
+        pixel_noise->smooth_tangent(contour_inputs(), image_size(), d, tangents, own_group_, own_image_,
+                                    aggregate.scratch(frame));
+        made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
+      }
+    }
+    own_pixels_.download(pixels.subspan(first_direction * of_direction, count * of_direction));
+  });
 }
 
 void Renderer::set_layers(int count) {

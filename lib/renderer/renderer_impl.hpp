@@ -123,9 +123,12 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void tangent(std::span<const SceneTangent> directions);
   std::size_t tangent_bytes() const;
   void cut_for_tangents(std::size_t directions);
-  /// Directions that share a pass, of so many; and the first of what a pass of them needs.
+  /// Directions that share a pass, of so many.
   std::size_t tangents_together(std::size_t directions) const;
-  void start_tangents(std::span<const SceneTangent> group, std::size_t first);
+  /// Calls a function of a group's first direction and its number of directions, for groups of those that share a
+  /// pass, while vertices and outlines move along the group's.
+  void move_in_groups(std::span<const SceneTangent> directions,
+                      const std::function<void(std::size_t, std::size_t)>& function);
   void set_layers(cl_uint count) noexcept;
   /// Throws InvalidArgument unless the last frame has samples for shading of the caller's own.
   void require_samples(const char* caller);

@@ -198,24 +198,27 @@ std::size_t Renderer::Impl::tangents_together(std::size_t directions) const {
   return std::min({directions, fitting, k_most});
 }
 
-void Renderer::Impl::start_tangents(std::span<const SceneTangent> group, std::size_t first) {
-  upload_directions(group);
-  tangents.first = to_uint(first);
-  transform.tangent(frame, device_views, *geometry, tangents);
-  if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
+void Renderer::Impl::move_in_groups(std::span<const SceneTangent> directions,
+                                    const std::function<void(std::size_t, std::size_t)>& function) {
+  const std::size_t together = tangents_together(directions.size());
+  for (std::size_t first = 0; first < directions.size(); first += together) {
+    const auto group = directions.subspan(first, std::min(together, directions.size() - first));
+    upload_directions(group);
+    tangents.first = to_uint(first);
+    transform.tangent(frame, device_views, *geometry, tangents);
+    if (frame.clips != 0) clip.tangent_of_outlines(frame, *geometry, tangents);
+    function(first, group.size());
+  }
 }
 
 void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   require_whole();
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(impl_of(device), directions.size() * image().size());
-  const std::size_t together = tangents_together(directions.size());
-  cut_for_tangents(together);
+  cut_for_tangents(tangents_together(directions.size()));
   if (pixel_noise) see_layers(1);
-  for (std::size_t first = 0; first < directions.size(); first += together) {
-    const auto group = directions.subspan(first, std::min(together, directions.size() - first));
-    start_tangents(group, first);
-    if (pixel_noise) tangents.rasters.resize(impl_of(device), group.size() * samples);
+  move_in_groups(directions, [&](std::size_t first, std::size_t count) {
+    if (pixel_noise) tangents.rasters.resize(impl_of(device), count * samples);
     if (geometry_colors) geometry_colors->tangent(frame, *geometry, transform, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {
@@ -227,7 +230,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
                         pixel_noise ? tangents.rasters : tangents.images);
     }
     if (pixel_noise) pixel_noise->tangent(contour_inputs(), image_size(), tangents, aggregate.scratch(frame));
-  }
+  });
 }
 
 std::vector<Image> Renderer::tangent(std::span<const SceneTangent> directions) {

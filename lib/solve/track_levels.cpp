@@ -13,7 +13,7 @@ TrackLevels::TrackLevels(const Device& device, const Scene& scene, const PoseOpt
     : space_(scene, near, options),
       camera_(scene.camera),
       near_depth_(view_depth(camera_, near.translation)),
-      unexplained_part_(first.unexplained_part),
+      baseline_part_(first.baseline_part),
       frame_(&frame) {
   const auto& method = std::get<LeastSquares>(options.method);
   std::vector<LevelShape> shapes = level_shapes(scene, method);
@@ -46,7 +46,7 @@ PoseLevel& TrackLevels::at(std::size_t level) {
 
 double TrackLevels::unexplained(std::size_t level) {
   Level& found = *levels_[level];
-  if (found.unexplained < 0) found.unexplained = unexplained_part_ * at(level).blank_loss();
+  if (found.unexplained < 0) found.unexplained = baseline_part_ * at(level).blank_loss();
   return found.unexplained;
 }
 

@@ -40,7 +40,7 @@ class TrackLevels {
 
   PoseSpace space_;
   Camera camera_;
-  double near_depth_, unexplained_part_;
+  double near_depth_, baseline_part_;
   std::vector<std::unique_ptr<Level>> levels_;
   const Image* frame_;
 };

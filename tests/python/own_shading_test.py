@@ -206,7 +206,6 @@ class OwnShadingTest(unittest.TestCase):
         wanted = float((gradients[0] * way).sum() + (gradients[1] * colors).sum())
         self.assertAlmostEqual(float((tangent * weights).sum()), wanted, delta=1e-4 * abs(wanted))
 
-
         def of_two(numbers):
             return shaded_by(vertices + numbers[0] * way, colors + numbers[1])
         jacobian = torch.func.jacfwd(of_two)(torch.zeros(2))

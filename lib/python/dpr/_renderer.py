@@ -244,8 +244,8 @@ class Renderer:
         """
         _plan.require_names(misspelt, ("layers", "copy"))
         samples = self._rasterize(vertices, faces, views, intrinsics, layers, copy)
-        if samples._warning:
-            warnings.warn(samples._warning, stacklevel=2)
+        if samples._rasterized.warning:
+            warnings.warn(samples._rasterized.warning, stacklevel=2)
         return samples
 
     def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):

@@ -31,6 +31,7 @@ class Rasterized:
             named += _frames.NO_MESH
         options = _frames.options_of(spec, settings, 0, [part.name for part in self._parts])
         self._frame = _frames.Frame(options, named)
+        # Of a frame that shows nothing.
         self.warning = _frames.NOTHING_RENDERED if self._frame.is_empty() else None
         self.raster = _library.Raster()
         _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
@@ -156,7 +157,6 @@ class Samples:
         self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
         self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
-        self._warning = rasterized.warning  # of a frame that shows nothing
         self._outputs = outputs
         self._vertices = next(array.shape[-2] for path, array in zip(plan.paths, plan.given) if path == ("vertices",))
 
