@@ -35,7 +35,7 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
 }
 
 /// Gradient of a faded sample with respect to its cut at a step.
-static inline Cut gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
+static inline Cut faded_gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
                                   global const float4* restrict raster, global const float4* restrict grad) {
   const Fading f = fading_of(p, steps, s);
   if ((step & 1 ? f.step.y : f.step.x) != step) return 0.0f;
@@ -77,8 +77,8 @@ static inline void differentiate_faded(const FrameParams p, const Steps steps, S
     if (k >= 2) continue;
     const Sample other = sample_beside(p, s, k);
     grad_cut[place_of(p, steps, s, k)] +=
-        gradient_at_end(p, steps, s, k, raster, grad_faded) +
-        gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
+        faded_gradient_at_end(p, steps, s, k, raster, grad_faded) +
+        faded_gradient_at_end(p, steps, other, DPR_OPPOSITE(k), raster, grad_faded);
   }
   grad_raster[s.index] = grad;
 }

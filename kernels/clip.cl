@@ -192,7 +192,7 @@ typedef struct {
 } OutlineGradients;
 
 /// The gradient of where a cut is seen.
-static inline float2 gradient_of_cut(const ClippedFace c, const OutlineGradients g, uint cut) {
+static inline float2 gradient_of_outline_cut(const ClippedFace c, const OutlineGradients g, uint cut) {
   const int is_quad = c.corners == 4;
   return cut == 0 ? (is_quad ? g.corner[2].xy : g.corner[1].xy) : is_quad ? g.corner[3].xy : g.corner[2].xy;
 }
@@ -202,8 +202,8 @@ static inline void store_corners(const FrameParams p, global const ViewParams* v
                                  const OutlineGradients g, global float* restrict grad_corners,
                                  global float* restrict grad_clip) {
   const int is_quad = c.corners == 4;
-  const float3 by_cut[2] = {cut_gradient(p, view, c, 0, gradient_of_cut(c, g, 0), g.part[0]),
-                            cut_gradient(p, view, c, 1, gradient_of_cut(c, g, 1), g.part[1])};
+  const float3 by_cut[2] = {cut_gradient(p, view, c, 0, gradient_of_outline_cut(c, g, 0), g.part[0]),
+                            cut_gradient(p, view, c, 1, gradient_of_outline_cut(c, g, 1), g.part[1])};
 #pragma unroll
   for (uint k = 0; k < 3; ++k) {
     const float3 none = 0.0f;
@@ -322,7 +322,7 @@ kernel void clip_backward(const FrameParams p, global const uint* restrict pairs
   if (!p.distorts) return;
 #pragma unroll
   for (uint cut = 0; cut < 2; ++cut) {
-    const float2 grad = gradient_of_cut(c, of_outline, cut);
+    const float2 grad = gradient_of_outline_cut(c, of_outline, cut);
     grad_cuts[(size_t)(2 * cut) * p.pairs + pair] = grad.x;
     grad_cuts[(size_t)(2 * cut + 1) * p.pairs + pair] = grad.y;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 #include <string>
 
 namespace dpr::cli {
@@ -33,7 +34,7 @@ class Progress {
   unsigned total_;
   std::string unit_, of_;
   bool quiet_, is_terminal_, line_is_open_ = false;
-  unsigned printed_tenths_ = 0;
+  std::optional<unsigned> printed_tenths_;
   /// Share at the update from which time is counted: earlier runs may have done much of the work, and a
   /// further attempt begins anew.
   double first_share_ = 0, last_share_ = 0;

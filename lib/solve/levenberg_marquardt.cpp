@@ -15,6 +15,10 @@ constexpr double k_least_damping = 1e-7, k_most_damping = 10;
 constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches no further
 constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
 constexpr double k_still_deviations = 0.3;   // nor do steps shorter than this part of the pose's uncertainty
+// Parts of the loss: what a step gains where no more is to be had, and what one loses that goes too far about the least.
+constexpr double k_little_gain = 1e-4, k_little_loss = 1e-2;
+// Steps like its last by which a candidate may reach the best one.
+constexpr double k_steps_to_best = 20;
 
 /// The lower Cholesky factor of a symmetric matrix; false if it is not positive definite to rounding.
 bool factorize(PoseSpace::Matrix& a, std::size_t n) {
@@ -74,6 +78,7 @@ bool next_step(Candidate& candidate, const PoseSpace& space, double pixel_ndc, P
   return !candidate.is_still;
 }
 
+/// Takes the step, or else a shorter one next.
 void judge(Candidate& candidate, const Hypothesis& hypothesis, const NormalEquations& equations) {
   if (equations.loss < candidate.equations.loss) {
     candidate.hypothesis = hypothesis;
@@ -82,6 +87,14 @@ void judge(Candidate& candidate, const Hypothesis& hypothesis, const NormalEquat
   } else {
     candidate.damping *= k_damping_rise;
   }
+}
+
+/// True if the candidate need not go on after a step that took `fall` off its loss: little is to be gained, or at this
+/// pace it would not reach the `least` loss of all.
+bool is_done(const Candidate& candidate, double fall, double least) {
+  const double loss = candidate.equations.loss;
+  return std::abs(fall) < (fall > 0 ? k_little_gain : k_little_loss) * loss ||
+         (fall > 0 && loss - k_steps_to_best * fall > least);
 }
 
 /// Linearizes the candidates that came from another level.
@@ -147,6 +160,8 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
 
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report) {
+  // A robust loss is mostly what it has given up on: its parts say little.
+  const bool is_squared = level.scales().color == 0 && !level.has_observations();
   linearize(level, candidates);
   std::vector<double> losses;
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
@@ -163,7 +178,11 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
     }
     if (moving.empty()) break;
     const std::vector<NormalEquations> equations = level.linearize(hypotheses);
-    for (std::size_t i = 0; i < moving.size(); ++i) judge(*moving[i], hypotheses[i], equations[i]);
+    for (std::size_t i = 0; i < moving.size(); ++i) {
+      const double fall = moving[i]->equations.loss - equations[i].loss;
+      judge(*moving[i], hypotheses[i], equations[i]);
+      moving[i]->is_still = is_squared && is_done(*moving[i], fall, losses.back());
+    }
   }
   return true;
 }

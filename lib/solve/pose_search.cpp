@@ -25,7 +25,8 @@ constexpr std::size_t k_wrong = 15;
 class Fit {
  public:
   Fit(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-      std::span<const Pose> initial, const PosePlaces& places, const PoseSolver::Callback& callback)
+      std::span<const Pose> initial, const PosePlaces& places, bool anywhere,
+      const PoseSolver::Callback& callback)
       : device_(device),
         scene_(scene),
         target_(target),
@@ -33,13 +34,14 @@ class Fit {
         method_(std::get<LeastSquares>(options.method)),
         light_wanted_(target.pixels.empty() ? PoseLight::fixed : method_.light),
         callback_(callback),
+        anywhere_(anywhere),
         beam_(beam_of(method_)),
         initial_(initial.begin(), initial.end()),
         places_(places),
         space_(scene, places.about(), options),
         half_turns_(half_turns(space_.body().points(scene))) {}
 
-  FittedPose run(bool anywhere);
+  FittedPose run();
 
  private:
   void start(PoseLevel& level);
@@ -64,8 +66,8 @@ class Fit {
   void work(PoseLevel& level, std::size_t keep);
   void try_half_turns(PoseLevel& level);
   double enough() const { return enough_to_equal(candidates_.front().equations.loss, wrong_); }
-  void finish(PoseLevel& level, bool anywhere);
-  void choose_equals(bool anywhere);
+  void finish(PoseLevel& level);
+  void choose_equals();
   bool report(const PoseLevel& level);
 
   const Device& device_;
@@ -75,6 +77,7 @@ class Fit {
   const LeastSquares& method_;
   PoseLight light_wanted_;  // fixed of a target without colours
   const PoseSolver::Callback& callback_;
+  bool anywhere_;  // the first initial pose is as good as any
   const Beam& beam_;
   std::vector<Pose> initial_;
   const PosePlaces& places_;
@@ -88,7 +91,7 @@ class Fit {
   PoseResult result_;
 };
 
-FittedPose Fit::run(bool anywhere) {
+FittedPose Fit::run() {
   result_.start = initial_.front();
   const std::vector<LevelShape> shapes = places_.shapes(level_shapes(scene_, method_), space_);
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
@@ -100,13 +103,13 @@ FittedPose Fit::run(bool anywhere) {
   rescale(level);
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
-  if (anywhere) try_half_turns(level);
+  if (anywhere_) try_half_turns(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scales(level.scales());
   wrong_ = wrong_loss(sampled);
-  const bool is_doubted = anywhere && is_doubtful(candidates_, space_, enough());
-  finish(level, anywhere);
+  const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
+  finish(level);
   const double blank = sampled.blank_loss(), unexplained = std::min(wrong_, blank);
   const bool is_robust = method_.robust || (target_.pixels.empty() && !method_.depth.image.pixels.empty());
   if (unexplained > 0) result_.unexplained_part = result_.loss / unexplained;
@@ -241,7 +244,7 @@ void Fit::start(PoseLevel& level) {
   for (const PlaceGroup& group : places_.others(level, method_.rotations))
     std::ranges::copy(least_losses(level, group.hypotheses, group.keep), std::back_inserter(candidates_));
   for (const Pose& pose : initial_) candidates_.push_back({{pose}});
-  candidates_[candidates_.size() - initial_.size()].is_initial = true;
+  candidates_[candidates_.size() - initial_.size()].is_initial = !anywhere_;
 }
 
 void Fit::work(PoseLevel& level, std::size_t keep) {
@@ -260,18 +263,18 @@ bool Fit::report(const PoseLevel& level) {
   return !callback_ || callback_(result_.history.back());
 }
 
-void Fit::finish(PoseLevel& level, bool anywhere) {
-  choose_equals(anywhere);
+void Fit::finish(PoseLevel& level) {
+  choose_equals();
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = pose_covariance(level, space_, candidates_.front().hypothesis);
   result_.light = light_;
 }
 
 /// The poses that explain the target as well as the best, the one to return first.
-void Fit::choose_equals(bool anywhere) {
+void Fit::choose_equals() {
   const double most = enough();
   std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > most; });
-  if (!anywhere) {
+  if (!anywhere_) {
     const Hypothesis first{initial_.front()};
     std::ranges::stable_sort(candidates_, {},
                              [&](const Candidate& c) { return space_.distance(c.hypothesis, first); });
@@ -297,7 +300,7 @@ FittedPose fit_about_middle(const Device& device, const Scene& scene, const Imag
   }
   const PosePlaces places(pivot.scene(), options, starts.front(), anywhere);
   if (anywhere) starts = {places.about()};
-  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, report).run(anywhere);
+  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, anywhere, report).run();
   PoseResult& result = fitted.result;
   pivot.to_origin(result.pose, result.covariance);
   result.pose = pivot.to_origin(result.pose);
