@@ -11,7 +11,7 @@ namespace {
 
 // Deviations of poses that the model's error makes, in those of the residuals' scatter by pixels: as pictures by other
 // software have it (bench/results/notes.md).
-constexpr double k_model = 7.5, k_robust_model = 30;
+constexpr double k_model = 7.5, k_robust_model = 75;
 // Part of the weight of pixels that tell of the pose which a robust loss takes where there is clutter.
 constexpr double k_cluttered = 0.15;
 // Of the noise's scatter, as errors of poses in pictures with independent noise are (pose_uncertainty_test.cpp).

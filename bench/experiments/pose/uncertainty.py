@@ -134,17 +134,17 @@ def make_pictures(arguments):
     for stem, scene in scenes.items():
         random = np.random.default_rng([arguments.seed, *stem.encode()])
         for view in range(arguments.count):
-            kind = KINDS[view % len(KINDS)]
+            kind = arguments.kinds[view % len(arguments.kinds)]
             rotation, translation = uniform_rotation(random), random.uniform(-0.4, 0.4, 3)
             size = int(random.choice([96, 128, 160]))
             sized = dict(scene, width=size, height=size)
             mesh = dict(scene["meshes"][0])
-            if view // len(KINDS) % 4 == 3:  # one colour
+            if view // len(arguments.kinds) % 4 == 3:  # one colour
                 mesh.pop("vertex_colors", None)
                 mesh["face_colors"] = [[0.6, 0.6, 0.6]] * len(mesh["faces"])
             moved = dict(mesh, positions=(np.array(mesh["positions"]) @ rotation.T + translation).tolist())
             image = np.array(path_trace(mi, dict(sized, meshes=[moved]), np.eye(3), random, arguments.samples,
-                                        view + view // len(KINDS), "rgba"))
+                                        view + view // len(arguments.kinds), "rgba"))
             image, coverage = image[..., :3], image[..., 3:]
             image *= random.uniform(0.5, 0.9) / np.quantile(image[coverage[..., 0] > 0.5], 0.98)  # an exposure
             image, quality = spoil(random, kind, image, coverage)
@@ -314,6 +314,7 @@ def main():
     pictures.add_argument("--samples", type=int, default=64, help="a pixel")
     pictures.add_argument("--seed", type=int, default=1)
     pictures.add_argument("--count", type=int, default=24, help="pictures of each mesh")
+    pictures.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, help="how they are spoilt, in turn")
     pictures.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
     photographs = commands.add_parser("photographs")
     photographs.set_defaults(run=make_photographs)
