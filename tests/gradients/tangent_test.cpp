@@ -99,7 +99,7 @@ TEST_SUITE("tangents") {
     for (const char* preset : {"joint_gaussian", "gaussian", "pixel"}) {
       CAPTURE(std::string(preset));
       if (test::is_reduced() && std::string(preset) != "gaussian") continue;
-      Scene scene = scene_cut_open(make_icosphere(2), 40, 33);
+      Scene scene = scene_cut_open(make_icosphere(2), test::reduced(40, 20), test::reduced(33, 17));
       scene.smoothing = smoothing_preset(preset);
       Device device = open_device();
       Renderer renderer(device);
@@ -127,12 +127,13 @@ TEST_SUITE("tangents") {
 
   TEST_CASE("tangents leave the frame's gradient as it is") {
     for (const char* preset : {"gaussian", "pixel"}) {
-      Scene scene = cube_scene(24, 24);
+      const int size = test::reduced(24, 9);
+      Scene scene = cube_scene(size, size);
       scene.smoothing = smoothing_preset(preset);
       Renderer renderer(open_device());
       renderer.set_scene(scene);
       renderer.forward();
-      const std::vector<Image> weights{Image(24, 24, glm::vec4(0.5F))};
+      const std::vector<Image> weights{Image(size, size, glm::vec4(0.5F))};
       const SceneGradient before = renderer.backward(weights);
       renderer.forward();
       renderer.tangent(std::vector{moved_along_x(renderer)});
@@ -161,7 +162,8 @@ TEST_SUITE("tangents") {
   TEST_CASE("tangents are finite where a vertex lies in the camera's plane") {
     for (const char* preset : {"pixel", "rigid", "joint_gaussian"}) {
       CAPTURE(std::string(preset));
-      Scene scene = cube_scene(32, 32);
+      const int size = test::reduced(32, 10);
+      Scene scene = cube_scene(size, size);
       Mesh floor;
       floor.positions = {{-3, -1, 4}, {3, -1, 4}, {3, -1, -6}, {-3, -1, -6}};
       floor.faces = {{0, 1, 2}, {0, 2, 3}};

@@ -220,8 +220,9 @@ TEST_SUITE("pipeline") {
     // The cube's sides have one colour, and each a whole texture: of the 18 edges only the 12 between sides
     // differ.
     const auto contours = [](Mesh mesh) {
-      Scene scene = scene_of(std::move(mesh), 32, 32);
-      scene.smoothing = smoothing_preset("pixel", 32, 32);
+      const int size = reduced(32, 12);
+      Scene scene = scene_of(std::move(mesh), size, size);
+      scene.smoothing = smoothing_preset("pixel", size, size);
       Renderer renderer(open_device());
       renderer.set_scene(scene);
       renderer.forward();
