@@ -942,6 +942,108 @@ static void test_frame_samples(void) {
   dpr_frame_destroy(frame);
 }
 
+/* The two nearest surfaces of two triangles, one behind the other; and forward against backward mode of samples and of
+ * what is made of them: <u, J v> = <J^T u, v>, two directions at once. */
+static void test_frame_layers(void) {
+  float view[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3, 0, 0, 0, 1}, intrinsics[] = {20, 20, 8.2f, 7.9f};
+  float vertices[18], of_vertices[36], grad_vertices[18], weights[SIDE * SIDE * 3],
+      images[2 * SIDE * SIDE * 3];
+  int32_t of_faces[] = {0, 1, 2, 3, 4, 5};
+  const char* const settings[] = {"preset=pixel", "sigma=1e-2", "layers=2"};
+  const char* const wanted[] = {"vertices"};
+  const dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 2, {6, 3}},
+                              {"faces", of_faces, DPR_INT32, 2, {2, 3}},
+                              {"views", view, DPR_FLOAT32, 3, {1, 4, 4}},
+                              {"intrinsics", intrinsics, DPR_FLOAT32, 2, {1, 4}}};
+  const dpr_array moved = {"vertices", of_vertices, DPR_FLOAT32, 3, {2, 6, 3}};
+  const dpr_array gradient = {"vertices", grad_vertices, DPR_FLOAT32, 2, {6, 3}};
+  dpr_frame_options options = DPR_FRAME_OPTIONS_INIT;
+  dpr_raster raster;
+  dpr_frame* frame = NULL;
+  size_t count, k, covered = 0, direction;
+  memcpy(vertices, positions, sizeof positions);
+  for (k = 0; k < 9; ++k) vertices[9 + k] = 1.3f * positions[k] - (k % 3 == 2 ? 0.5f : 0);
+  for (k = 0; k < 36; ++k) of_vertices[k] = sinf((float)k);
+  for (k = 0; k < SIDE * SIDE * 3; ++k) weights[k] = sinf(0.7f * (float)k);
+  options.width = options.height = SIDE;
+  options.settings = settings, options.setting_count = 3;
+  options.gradients = wanted, options.gradient_count = 1;
+  OK(dpr_frame_render(&options, arrays, 4, &frame));
+  OK(dpr_frame_raster(frame, &raster));
+  EXPECT(raster.layers == 2);
+  count = (size_t)raster.width * (size_t)raster.height;
+  {
+    const size_t h = (size_t)raster.height, w = (size_t)raster.width;
+    int64_t* const faces_seen = malloc(2 * count * sizeof *faces_seen);
+    float *const depth = malloc(2 * count * sizeof(float)),
+                 *const grad_depth = malloc(2 * count * sizeof(float)),
+                 *const of_depth = malloc(4 * count * sizeof(float));
+    float *const values = malloc(3 * count * sizeof(float)),
+                 *const grad_values = malloc(3 * count * sizeof(float)),
+                 *const of_values = malloc(6 * count * sizeof(float));
+    const dpr_array samples[] = {{"face_id", faces_seen, DPR_INT64, 3, {2, h, w}},
+                                 {"depth", depth, DPR_FLOAT32, 3, {2, h, w}}};
+    const dpr_array grad_samples = {"depth", grad_depth, DPR_FLOAT32, 3, {2, h, w}};
+    const dpr_array depths_moved = {"depth", of_depth, DPR_FLOAT32, 3, {4, h, w}};
+    const dpr_array shaded = {"values", values, DPR_FLOAT32, 4, {1, h, w, 3}};
+    const dpr_array grad_shaded = {"grad_values", grad_values, DPR_FLOAT32, 4, {1, h, w, 3}};
+    const dpr_array values_moved = {"value_tangents", of_values, DPR_FLOAT32, 4, {2, h, w, 3}};
+    const dpr_array grad = {"grad_images", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 3}};
+    const dpr_array images_moved = {"images", images, DPR_FLOAT32, 4, {2, SIDE, SIDE, 3}};
+    dpr_array wrong = values_moved;
+    OK(dpr_frame_samples(frame, samples, 2));
+    for (k = 0; k < count; ++k) {
+      const int64_t nearest = faces_seen[k], behind = faces_seen[count + k];
+      EXPECT(behind == (nearest == 0 ? 1 : -1) || nearest == 0);
+      EXPECT(behind < 0 ? depth[count + k] == 0 : depth[count + k] > depth[k]);
+      covered += behind == 1;
+    }
+    EXPECT(covered > 0 && covered < count);
+
+    for (k = 0; k < 2 * count; ++k) grad_depth[k] = cosf((float)k);
+    OK(dpr_frame_samples_backward(frame, &grad_samples, 1, &gradient, 1));
+    OK(dpr_frame_samples_tangent(frame, 2, &moved, 1, &depths_moved, 1));
+    for (direction = 0; direction < 2; ++direction) {
+      double forward = 0, size = 0, backward = 0;
+      for (k = 0; k < 2 * count; ++k) {
+        const double term = (double)grad_depth[k] * (double)of_depth[2 * count * direction + k];
+        forward += term, size += fabs(term);
+      }
+      for (k = 0; k < 18; ++k) backward += (double)grad_vertices[k] * (double)of_vertices[18 * direction + k];
+      EXPECT(size > 1 && fabs(forward - backward) < 1e-5 * size);
+    }
+
+    for (k = 0; k < 3 * count; ++k) values[k] = sinf(0.3f * (float)k);
+    for (k = 0; k < 6 * count; ++k) of_values[k] = cosf(1.1f * (float)k);
+    OK(dpr_frame_resolve_backward(frame, &shaded, &grad, &grad_shaded, &gradient, 1));
+    OK(dpr_frame_resolve_tangent(frame, 2, &moved, 1, &shaded, &values_moved, &images_moved));
+    for (direction = 0; direction < 2; ++direction) {
+      double forward = 0, size = 0, backward = 0;
+      for (k = 0; k < SIDE * SIDE * 3; ++k) {
+        const double term = (double)weights[k] * (double)images[SIDE * SIDE * 3 * direction + k];
+        forward += term, size += fabs(term);
+      }
+      for (k = 0; k < 18; ++k) backward += (double)grad_vertices[k] * (double)of_vertices[18 * direction + k];
+      for (k = 0; k < 3 * count; ++k)
+        backward += (double)grad_values[k] * (double)of_values[3 * count * direction + k];
+      EXPECT(size > 1 && fabs(forward - backward) < 1e-5 * size);
+    }
+
+    REFUSED(dpr_frame_samples_tangent(frame, 0, &moved, 1, &depths_moved, 1), "directions");
+    REFUSED(dpr_frame_samples_tangent(frame, 1, &moved, 1, &depths_moved, 1), "depth");
+    REFUSED(dpr_frame_samples_tangent(frame, 2, &moved, 1, samples, 1), "face_id");
+    wrong.shape[0] = 1;
+    REFUSED(dpr_frame_resolve_tangent(frame, 2, &moved, 1, &shaded, &wrong, &images_moved), "value_tangents");
+    wrong = grad;
+    REFUSED(dpr_frame_resolve_tangent(frame, 2, &moved, 1, &shaded, &values_moved, &wrong), "images");
+    of_values[0] = NAN;
+    REFUSED(dpr_frame_resolve_tangent(frame, 2, &moved, 1, &shaded, &values_moved, &images_moved), "finite");
+    free(faces_seen), free(depth), free(grad_depth), free(of_depth);
+    free(values), free(grad_values), free(of_values);
+  }
+  dpr_frame_destroy(frame);
+}
+
 /* An image of the renderer's last frame that differs from another. */
 static int differs(const dpr_renderer* renderer, const float* image) {
   float pixels[FLOATS];
@@ -1567,6 +1669,7 @@ int main(void) {
   test_mesh_files();
   test_image_files();
   test_frame_samples();
+  test_frame_layers();
   test_setters(device);
   test_mesh_loss(device, scene);
   test_attributes(device, scene);
