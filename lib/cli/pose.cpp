@@ -100,8 +100,8 @@ std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
   };
   add("--search", "forgets the start");
   add("--translation", "finds a displaced object");
-  add("--focal", "an unknown focal length");
-  add("--distortion", "a lens");
+  add("--focal", "finds an unknown focal length");
+  add("--distortion", "finds a lens");
   add("--robust", "is for clutter and occlusion");
   if (options.least_squares.light == name_of(PoseLight::fixed))
     text += (text.empty() ? "" : "; ") + std::string("--light harmonics for another light");

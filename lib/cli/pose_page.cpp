@@ -15,7 +15,7 @@ std::string vector_text(const glm::dvec3& v) { return format("%.6g, %.6g, %.6g",
 /// A solver that tries rotations all around does not go on from the start.
 std::string search_text(const PoseResult& result) {
   if (result.history.empty() || result.history.front().hypotheses == 1) return "";
-  return " Many poses are turned at once: an iteration shows the best of them.";
+  return " Many poses are refined together: an iteration shows the best of them.";
 }
 
 std::string light_text(const PoseResult& result) {
@@ -30,7 +30,8 @@ std::string uncertainty_text(const PoseResult& result) {
   if (c.empty()) return "";
   const auto size = static_cast<std::size_t>(std::lround(std::sqrt(static_cast<double>(c.size()))));
   const double variance = c[0] + c[size + 1] + c[2 * size + 2];
-  return format("%.2g degrees, one standard deviation", glm::degrees(std::sqrt(variance)));
+  return format("%.2g degrees, one standard deviation%s", glm::degrees(std::sqrt(variance)),
+                result.explained ? "" : ", if the pose is right");
 }
 
 void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::dmat3>& truth) {

@@ -143,9 +143,8 @@ std::string name_of(PoseDoubt doubt) {
 
 std::string doubt_text(const PoseResult& result) {
   if (result.doubt == PoseDoubt::other_pose) return "another pose leaves little more of it";
-  return format(
-      "%.2g of what %s stays", result.unexplained_part,
-      result.doubt == PoseDoubt::empty_picture ? "a picture without the object leaves" : "wrong poses leave");
+  return format("the error is %.3g times that of %s", result.unexplained_part,
+                result.doubt == PoseDoubt::empty_picture ? "a picture without the object" : "wrong poses");
 }
 
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {

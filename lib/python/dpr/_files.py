@@ -1,7 +1,6 @@
 """Files of meshes and images."""
 import ctypes
 import os
-import warnings
 from typing import Any, Dict, Optional, Sequence, Union
 
 import numpy as np
@@ -54,7 +53,7 @@ def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
             name, _, words = text.decode().partition("=")
             mesh[name] = words.split(",")
         for note in contents.notes[:contents.note_count]:
-            warnings.warn("dpr: " + note.decode(errors="replace"), stacklevel=2)
+            _library.warn("dpr: " + note.decode(errors="replace"))
     finally:
         _library.library.dpr_mesh_file_destroy(handle)
     return mesh
@@ -73,7 +72,7 @@ def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Arr
     be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
     """
     if materials is not None or face_materials is not None:
-        warnings.warn(f"dpr: {file} is written without materials", stacklevel=2)
+        _library.warn(f"dpr: {file} is written without materials")
     named = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors, "texcoords": texcoords,
              "face_texcoords": face_texcoords, "face_textures": face_textures}
     textures = [] if textures is None else textures if isinstance(textures, (list, tuple)) else [textures]

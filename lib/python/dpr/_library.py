@@ -4,6 +4,7 @@ import ctypes
 import glob
 import os
 import pathlib
+import sys
 import warnings
 from typing import Any, Dict, List
 
@@ -11,6 +12,14 @@ from ._version import VERSION
 
 _HOW_TO_GET_A_DRIVER = ("install one: `apt install ocl-icd-libopencl1 pocl-opencl-icd` on Debian and Ubuntu, `pip install` the wheel "
                         "dpr_pocl, or that of a GPU's vendor")
+
+
+def warn(text: str) -> None:
+    """A UserWarning at the line that called the package."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and frame.f_globals.get("__package__") == __package__:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, stacklevel=level)
 
 
 class Error(RuntimeError):

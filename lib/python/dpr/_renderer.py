@@ -3,7 +3,6 @@ from __future__ import annotations
 
 import inspect
 import types
-import warnings
 from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -245,7 +244,7 @@ class Renderer:
         _plan.require_names(misspelt, ("layers", "copy"))
         samples = self._rasterize(vertices, faces, views, intrinsics, layers, copy)
         if samples._rasterized.warning:
-            warnings.warn(samples._rasterized.warning, stacklevel=2)
+            _library.warn(samples._rasterized.warning)
         return samples
 
     def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):
@@ -295,9 +294,9 @@ class Renderer:
 
 
 def _result(spec, found, warning):
-    """What a caller's caller gets, who is told the warning."""
+    """What a caller gets, who is told the warning."""
     if warning:
-        warnings.warn(warning, stacklevel=3)
+        _library.warn(warning)
     return (found[0], dict(zip(spec.outputs, found[1:]))) if spec.outputs else found[0]
 
 
