@@ -36,7 +36,8 @@ kernel void antialias_fade(const FrameParams p, global const uint* restrict tile
 
 /// Gradient of a faded sample with respect to its cut at a step.
 static inline Cut faded_gradient_at_end(const FrameParams p, const Steps steps, Sample s, int step,
-                                  global const float4* restrict raster, global const float4* restrict grad) {
+                                        global const float4* restrict raster,
+                                        global const float4* restrict grad) {
   const Fading f = fading_of(p, steps, s);
   if ((step & 1 ? f.step.y : f.step.x) != step) return 0.0f;
   const float4 own = f.limit < 1.0f ? faded(p, steps, s, f, raster) : raster[s.index];

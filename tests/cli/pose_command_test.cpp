@@ -135,7 +135,7 @@ TEST_SUITE("pipeline") {
     CHECK(pose["doubt"] == "empty_picture");
     CHECK(pose["unexplained_part"].get<double>() > 0.1);
     CHECK(contains(solved.out, " times that of a picture without the object"));
-    CHECK(contains(folder.read("report/index.html"), "a picture without the object"));
+    CHECK(contains(folder.read("report/index.html"), " times that of a picture without the object"));
   }
 
   TEST_CASE("dpr pose: the light that it found explains the target") {
