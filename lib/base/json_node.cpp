@@ -15,7 +15,7 @@ namespace {
 std::string in_quotes(std::string_view key) { return "\"" + std::string(key) + "\""; }
 
 // Describes a value in messages.
-std::string describe(const nlohmann::json& value) {
+std::string described(const nlohmann::json& value) {
   constexpr std::size_t k_longest = 40;
   if (value.is_object()) return "an object";
   if (value.is_array()) return "a list of " + std::to_string(value.size());
@@ -98,7 +98,7 @@ void JsonNode::fail(const std::string& got, const std::string& expected) const {
   throw InvalidArgument(name(), got, expected);
 }
 
-void JsonNode::fail_type(const std::string& expected) const { fail(describe(*value_), expected); }
+void JsonNode::fail_type(const std::string& expected) const { fail(described(*value_), expected); }
 
 std::string JsonNode::member_path(std::string_view key) const {
   return path_.empty() ? std::string(key) : path_ + "." + std::string(key);

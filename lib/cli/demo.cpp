@@ -86,7 +86,7 @@ std::vector<Camera> cameras_around() {
 }
 
 /// Images of the cube's colours, without its light, and the views file for `dpr fit`.
-void write_views(const std::filesystem::path& folder, const Device& device, const Mesh& cube) {
+void write_demo_views(const std::filesystem::path& folder, const Device& device, const Mesh& cube) {
   constexpr int k_size = 64;
   const std::vector<Camera> cameras = cameras_around();
   const std::vector<Image> images = render_rigidly(device, cube, cameras, k_size, k_size);
@@ -107,7 +107,7 @@ void write_inputs(const std::filesystem::path& folder, const Device& device, con
   write_json(folder / "truth.json", scene_to_json(scene, truth));
   write_json(folder / "scene.json", scene_to_json(scene, start));
   write_image(folder / "target.exr", target);
-  write_views(folder, device, scene.meshes.front().mesh);
+  write_demo_views(folder, device, scene.meshes.front().mesh);
 }
 
 void run(const CLI::App& command, const std::string& folder, const CommonOptions& common) {

@@ -25,7 +25,7 @@ struct Format {
   bool bytes;
 };
 
-constexpr std::array<Format, 9> k_formats{{{".exr", 4, false},
+constexpr std::array<Format, 9> k_image_formats{{{".exr", 4, false},
                                            {".png", 4, true},
                                            {".tif", 4, true},
                                            {".tiff", 4, true},
@@ -38,7 +38,7 @@ constexpr std::array<Format, 9> k_formats{{{".exr", 4, false},
 const Format& format_of(const std::filesystem::path& file) {
   const std::string extension = lower_case_extension(file);
   std::string known;
-  for (const Format& format : k_formats) {
+  for (const Format& format : k_image_formats) {
     if (format.extension == extension) return format;
     if (!known.empty()) known += ", ";
     known += format.extension;

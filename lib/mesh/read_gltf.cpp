@@ -17,7 +17,7 @@
 namespace dpr {
 namespace {
 
-constexpr std::uint64_t k_most = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t k_largest_index = std::numeric_limits<std::uint32_t>::max();
 
 /// Extensions without which a file may not be read, and which are.
 constexpr std::array<std::string_view, 4> k_extensions{"KHR_materials_unlit", "KHR_mesh_quantization",
@@ -108,7 +108,7 @@ class GltfReader {
     std::vector<Place> places;
     const auto push = [&](const JsonNode& number, const glm::mat4& parent) {
       const JsonNode& node = document_.named("nodes", number);
-      if (!visited_.insert(number.whole_number(k_most)).second)
+      if (!visited_.insert(number.whole_number(k_largest_index)).second)
         number.fail("a node twice", "every node once");
       places.push_back({node, parent});
     };
@@ -264,7 +264,7 @@ class GltfReader {
 
   const BaseColor& base_color(const JsonNode& number) {
     const JsonNode& material = document_.named("materials", number);
-    const auto [place, is_new] = colors_.try_emplace(number.whole_number(k_most));
+    const auto [place, is_new] = colors_.try_emplace(number.whole_number(k_largest_index));
     BaseColor& color = place->second;
     if (!is_new) return color;
     std::string unread;
@@ -287,7 +287,7 @@ class GltfReader {
   void read_texture_of(const JsonNode& reference, BaseColor& color) {
     std::uint64_t set = 0;
     if (const std::optional<JsonNode> texcoord = reference.find("texCoord"))
-      set = texcoord->whole_number(k_most);
+      set = texcoord->whole_number(k_largest_index);
     if (const std::optional<JsonNode> extensions = reference.find("extensions")) {
       if (const std::optional<JsonNode> moved = extensions->find("KHR_texture_transform")) {
         color.transform.offset = glm::vec2(numbers_or(*moved, "offset", 2, glm::vec4(0)));
@@ -295,13 +295,13 @@ class GltfReader {
         if (const std::optional<JsonNode> rotation = moved->find("rotation"))
           color.transform.rotation = rotation->number();
         if (const std::optional<JsonNode> texcoord = moved->find("texCoord"))
-          set = texcoord->whole_number(k_most);
+          set = texcoord->whole_number(k_largest_index);
       }
     }
     color.texcoords = "TEXCOORD_" + std::to_string(set);
     const JsonNode index = reference.at("index");
     const JsonNode& texture = document_.named("textures", index);
-    const auto [place, is_new] = textures_.try_emplace(index.whole_number(k_most), k_no_texture);
+    const auto [place, is_new] = textures_.try_emplace(index.whole_number(k_largest_index), k_no_texture);
     if (is_new) {
       std::optional<Texture> read = image_of(texture);
       if (read) {
@@ -337,7 +337,7 @@ class GltfReader {
   void apply_sampler(const JsonNode& sampler, Texture& texture) {
     const auto value = [&](std::string_view key, std::uint64_t otherwise) {
       const std::optional<JsonNode> found = sampler.find(key);
-      return found ? found->whole_number(k_most) : otherwise;
+      return found ? found->whole_number(k_largest_index) : otherwise;
     };
     constexpr std::uint64_t k_repeat = 10497, k_clamp = 33071, k_mirror = 33648, k_nearest = 9728;
     constexpr std::uint64_t k_first_of_mips = 9984, k_last_of_mips = 9987;

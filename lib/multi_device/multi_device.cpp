@@ -10,6 +10,7 @@
 #include "multi_device/multi_device_impl.hpp"
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
+#include "scene/scene_parts.hpp"
 
 namespace dpr {
 

@@ -8,6 +8,7 @@
 
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
+#include "scene/scene_parts.hpp"
 #include "smoothing/priors.hpp"
 
 namespace dpr {

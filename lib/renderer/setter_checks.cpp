@@ -7,12 +7,6 @@
 
 namespace dpr {
 
-View own_view(const Scene& scene) {
-  View view{scene.camera, {}};
-  for (const Instance& instance : scene.meshes) view.transforms.push_back(instance.transform);
-  return view;
-}
-
 void check_layers(std::int64_t count, const std::string& argument) {
   constexpr std::int64_t k_most = 256;
   if (count < 1 || count > k_most)

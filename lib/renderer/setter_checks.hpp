@@ -14,9 +14,6 @@
 
 namespace dpr {
 
-/// The view of a scene's own camera and transforms.
-View own_view(const Scene& scene);
-
 /// Throws InvalidArgument for another number of layers than Renderer::set_layers() takes.
 void check_layers(std::int64_t count, const std::string& argument);
 

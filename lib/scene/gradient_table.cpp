@@ -18,7 +18,7 @@ using Of = GradientOf;
 using G = SceneGradient;
 using I = GradientIndex;
 
-constexpr std::array k_names{
+constexpr std::array k_gradient_names{
     GradientName{"positions", &Request::positions},   GradientName{"colors", &Request::colors},
     GradientName{"transform", &Request::transform},   GradientName{"camera", &Request::camera},
     GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
@@ -121,12 +121,12 @@ std::vector<GradientRow> make_rows() {
 
 }  // namespace
 
-std::span<const GradientName> gradient_names() { return k_names; }
+std::span<const GradientName> gradient_names() { return k_gradient_names; }
 
 bool GradientRequest::*parse_gradient(std::string_view word, const std::string& argument) {
-  std::array<std::string_view, k_names.size()> words;
-  std::ranges::transform(k_names, words.begin(), &GradientName::word);
-  return k_names[position_of(word, words, argument)].wanted;
+  std::array<std::string_view, k_gradient_names.size()> words;
+  std::ranges::transform(k_gradient_names, words.begin(), &GradientName::word);
+  return k_gradient_names[position_of(word, words, argument)].wanted;
 }
 
 std::span<const GradientRow> gradient_rows() {
@@ -136,7 +136,7 @@ std::span<const GradientRow> gradient_rows() {
 
 GradientRequest no_gradients() {
   GradientRequest request;
-  for (const GradientName& name : k_names) request.*name.wanted = false;
+  for (const GradientName& name : k_gradient_names) request.*name.wanted = false;
   return request;
 }
 

@@ -25,6 +25,12 @@ void validate_instance(const Scene& scene, std::size_t i, const std::string& nam
 
 }  // namespace
 
+View own_view(const Scene& scene) {
+  View view{scene.camera, {}};
+  for (const Instance& entry : scene.meshes) view.transforms.push_back(entry.transform);
+  return view;
+}
+
 void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t source,
                     const std::string& argument) {
   const auto fault = [&]() -> std::string {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "dpr/scene.hpp"
+#include "dpr/renderer.hpp"
 
 namespace dpr {
 
@@ -15,6 +15,9 @@ namespace dpr {
 /// `source`; says what is wrong with it.
 void require_source(std::span<const Instance> meshes, std::size_t i, std::size_t source,
                     const std::string& argument);
+
+/// The view of a scene's own camera and transforms.
+View own_view(const Scene& scene);
 
 /// Names in files, in the order of Cull.
 inline constexpr std::array<std::string_view, 3> k_culls{"none", "back", "front"};

@@ -7,6 +7,7 @@
 #include "dpr/subdivision.hpp"
 #include "mesh/mesh_subdivision.hpp"
 #include "scene/lens_sides.hpp"
+#include "scene/scene_parts.hpp"
 
 namespace dpr {
 namespace {
@@ -28,12 +29,6 @@ void validate(std::span<const View> views, std::size_t meshes) {
     for (const glm::mat4& transform : views[v].transforms)
       checks::require_affine(transform, checks::in("transform", name));
   }
-}
-
-View own_view(const Scene& scene) {
-  View view{scene.camera, {}};
-  for (const Instance& entry : scene.meshes) view.transforms.push_back(entry.transform);
-  return view;
 }
 
 /// Every place of a mesh before every lens.

@@ -97,8 +97,9 @@ class NumpyTest(unittest.TestCase):
         for wrong in ({"image": image[0]}, {"face_id": image[..., 0]}, {"colour": image}):
             with self.assertRaisesRegex(ValueError, "gradient"):
                 pullback(**wrong)
-        with self.assertRaisesRegex(ValueError, "wrt .* got 'colors', expected names of arrays"):
-            dpr.render_with_vjp(SQUARE, SQUARE_FACES, views, intrinsics, width=SIZE, height=SIZE, wrt=["colors"])
+        for name in ("colors", "faces"):
+            with self.assertRaisesRegex(ValueError, f"wrt .* got '{name}', expected names of given arrays"):
+                dpr.render_with_vjp(SQUARE, SQUARE_FACES, views, intrinsics, width=SIZE, height=SIZE, wrt=[name])
 
     def test_lists_and_views_of_their_own(self):
         views, intrinsics = cameras(2)

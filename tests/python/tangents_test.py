@@ -174,7 +174,8 @@ class NumpyTest(TangentsTest):
                 (r"tangents of vertices .* \[1, 5, 3\], expected \[2, 5, 3\]", SMOOTH,
                  {"tangents": {"vertices": moved, "views": np.zeros((2, 1, 4, 4), np.float32)}}),
                 ("tangents of lights .* 'ponit'", SMOOTH, {**lit, "tangents": {"lights": {"ponit": moved}}}),
-                ("tangents of faces .* indices stay", SMOOTH, {"tangents": {"faces": moved}}),
+                ("tangents .* got .faces., expected names of given arrays that are no indices: ", SMOOTH,
+                 {"tangents": {"faces": moved}}),
                 ("tangent of vertices .* not finite", SMOOTH, {"tangents": {"vertices": moved + np.inf}}),
                 ("tangents .* none", SMOOTH, {"tangents": {}})):
             with self.subTest(message), self.assertRaisesRegex(ValueError, message):

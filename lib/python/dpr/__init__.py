@@ -11,7 +11,7 @@ of arguments, and read_image() and write_image() go with them; image_loss() is o
 sample_points() are of shapes. Two modules are for PyTorch alone: dpr.shading has materials, environments and shadows, dpr.nvdiffrast
 nvdiffrast's operations.
 """
-import importlib
+import importlib as _importlib
 
 from . import cameras
 from ._files import read_image, read_mesh, write_image, write_mesh
@@ -34,5 +34,5 @@ __all__ = ["DeviceError", "Error", "InvalidArgument", "IoError", "MeshLoss", "Re
 def __getattr__(name):
     """The modules that import PyTorch, when they are first asked for."""
     if name in ("nvdiffrast", "shading"):
-        return importlib.import_module("." + name, __name__)
+        return _importlib.import_module("." + name, __name__)
     raise AttributeError(f"module 'dpr' has no attribute '{name}'")

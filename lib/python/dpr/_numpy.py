@@ -26,10 +26,10 @@ def _nested(paths, found):
 
 
 def _require_given(argument, names, plan):
-    given = {path[0] for path in plan.paths}
+    given = {path[0] for path, leaf in zip(plan.paths, plan.leaves) if _arrays.type_of(leaf) == "float32"}
     for name in names:
         if name not in given:
-            _arrays.fail(ValueError, argument, repr(name), "names of arrays that are given: " + ", ".join(sorted(given)))
+            _arrays.fail(ValueError, argument, repr(name), "names of given arrays that are no indices: " + ", ".join(sorted(given)))
 
 
 def _at(path, place):
@@ -57,8 +57,6 @@ def tangents_of_leaves(plan, tangents):
         if tangent is None:
             continue
         name = "tangents of " + ".".join(map(str, path))
-        if _arrays.type_of(leaf) != "float32":
-            _arrays.fail(ValueError, name, "some", "none: indices stay")
         tangent = _arrays.to_numpy(_arrays.converted(name, tangent))
         if count is None and tangent.ndim == 1 + len(given.shape):
             count = len(tangent)
