@@ -2,7 +2,7 @@
 # Draws the pictures of include/examples by running the tutorials in full. From the repository's root, after
 # `cmake --build --preset release`; the tutorials in PyTorch need a python3 that has torch.
 #
-#   bench/report/tutorials.sh [TUTORIAL...]    pose mesh texture shading materials glass light unless given
+#   bench/report/tutorials.sh [TUTORIAL...]    first pose mesh texture shading training materials glass light unless given
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -32,16 +32,19 @@ plot $(IFS=,; echo "${plots[*]}")
 END
 }
 
-(($#)) || set -- pose mesh texture shading materials glass light
+(($#)) || set -- first pose mesh texture shading training materials glass light
 for name in "$@"; do
   program=build/release/bin/dpr_document_tutorial_$name
   options=()
   [[ -x $program ]] && options+=(--program "$program")
-  [[ $name == shading || $name == materials || $name == glass ]] && options+=(--python "$(command -v python3)")
+  [[ $name =~ ^(first|shading|training|materials|glass)$ ]] && options+=(--python "$(command -v python3)")
   python3 tests/documents/blocks.py run "include/examples/$name.md" --source . --build build/release \
     --work "$work/$name" --full "${options[@]}"
   cd "$work/$name"
   case $name in
+    first) draw first 4 160 160 image.png "an image" derivative.png "its derivative by a turn" target.png "turned" \
+      found.png "the pose found" ;;
+    training) draw training 1 768 96 unseen.png "pictures it has not seen" predicted.png "the poses that it says" ;;
     pose) draw pose 4 144 144 pose/target.png "the photograph" pose/start.png "the start" \
       pose/end.png "the pose found" found.png "in the light found" ;;
     mesh) draw mesh 1 782 96 fit/targets.png "eight of the views" fit/results.png "the mesh found, from the same sides" ;;

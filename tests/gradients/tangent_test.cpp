@@ -34,6 +34,14 @@ SceneTangent moved_along_x(const Renderer& renderer) {
   return direction;
 }
 
+/// Under the simulator every third of them, from another one on for each seed.
+std::vector<Way> some_of(std::vector<Way> ways, unsigned seed) {
+  if (!test::is_reduced()) return ways;
+  std::vector<Way> some;
+  for (std::size_t k = seed % 3; k < ways.size(); k += 3) some.push_back(std::move(ways[k]));
+  return some;
+}
+
 }  // namespace
 
 TEST_SUITE("tangents") {
@@ -51,7 +59,8 @@ TEST_SUITE("tangents") {
       renderer.forward();
       const std::vector<Image> weights = random_images(renderer, random);
       SceneGradient gradient = renderer.backward(weights);
-      const std::vector<Way> ways = random_ways(gradient, trial.has("noise of triangles"), random);
+      const std::vector<Way> ways =
+          some_of(random_ways(gradient, trial.has("noise of triangles"), random), seed);
       const std::vector<double> errors = errors_of(renderer, weights, ways);
       for (std::size_t k = 0; k < ways.size(); ++k) {
         CAPTURE(ways[k].name);
@@ -84,6 +93,7 @@ TEST_SUITE("tangents") {
         SceneGradient gradient = shown.backward(weights);
         std::vector<Way> ways = random_ways(gradient, trial.has("noise of triangles"), random);
         std::erase_if(ways, [](const Way& way) { return way.name == "background"; });  // has none
+        ways = some_of(std::move(ways), seed);
         const std::vector<double> errors = errors_of(shown, weights, ways);
         for (std::size_t k = 0; k < ways.size(); ++k) {
           CAPTURE(ways[k].name);
