@@ -123,10 +123,10 @@ TEST_SUITE("pipeline") {
     }
   }
 
-  TEST_CASE("training: in a minute it learns shapes far better than the sphere's") {
+  TEST_CASE("training: in half a minute it learns shapes far better than the sphere's") {
     TrainingOptions options;
     options.batch = 8;
-    options.steps = 120;
+    options.steps = 60;
     options.checkpoint_every = 1000;
     const TempDir folder;
     const TrainingResult result = run(options, folder);
