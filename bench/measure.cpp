@@ -17,7 +17,7 @@
 namespace dpr::bench {
 namespace {
 
-constexpr double k_giga = 1e9, k_milli = 1e-3;
+constexpr double k_milli = 1e-3;
 
 using Clock = std::chrono::steady_clock;
 

@@ -15,7 +15,6 @@ namespace {
 constexpr unsigned k_chains = 10;            // DPR_CHAINS
 constexpr double k_seconds_per_run = 0.002;  // long against a launch, short against a scheduler's time slice
 constexpr int k_flop_runs = 200, k_stream_runs = 20;
-constexpr double k_giga = 1e9;
 
 cl::Program build(Device::Impl& device) {
   // In place of the include, the file: a compiler at run time has no folders.

@@ -5,6 +5,8 @@
 
 namespace dpr::bench {
 
+inline constexpr double k_giga = 1e9;  // in which operations and bytes are counted
+
 struct Peaks {
   double gflops = 0;        ///< 1e9 floating-point operations a second, a multiply-add counted as two
   double gbytes_per_s = 0;  ///< 1e9 bytes a second, read and written, by arrays far larger than the caches

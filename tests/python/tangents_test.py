@@ -168,7 +168,7 @@ class NumpyTest(TangentsTest):
                  {"sigma": np.float32([1e-3]), "tangents": {"sigma": np.float32([[1]])}}),
                 ("Monte Carlo", {**BARRIER, "aggregation_estimator": "monte_carlo"}, {"tangents": {"vertices": moved}}),
                 ("outputs .* 'depth'", SMOOTH, {"outputs": ["depth"], "tangents": {"vertices": moved}}),
-                ("tangents .* 'colors', expected names of arrays", SMOOTH, {"tangents": {"colors": moved}}),
+                ("tangents .* 'colors', expected names of given arrays", SMOOTH, {"tangents": {"colors": moved}}),
                 (r"tangents of vertices .* \[1, 4, 3\], expected \[1, 5, 3\]", SMOOTH,
                  {"tangents": {"vertices": moved[:, :4]}}),
                 (r"tangents of vertices .* \[1, 5, 3\], expected \[2, 5, 3\]", SMOOTH,
