@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/checks.hpp"
 #include "base/clock.hpp"
 #include "dpr/adaptive_smoothing.hpp"
 #include "dpr/multi_device.hpp"
