@@ -109,8 +109,8 @@
 #define DPR_TANGENT_PLANES DPR_PLANE_DISTANCE
 #define DPR_TANGENT_PLANE_BASE DPR_TANGENT_PLANES
 /// Rows of fragments: derivatives of their pixels' colour, in place of gradients; of alpha by ln p.
-#define DPR_ROW_WEIGHT 0 /* by the fragment's own colour, of each channel */
-#define DPR_ROW_DEPTH 1  /* RGB */
+#define DPR_ROW_WEIGHT 0        /* by the fragment's own colour, of each channel */
+#define DPR_ROW_DEPTH 1         /* RGB */
 #define DPR_ROW_LOG_OCCUPANCY 4 /* RGB */
 #define DPR_ROW_COVERAGE 7
 #define DPR_FRAGMENT_ROWS DPR_GRAD_PLANE_BASE
@@ -131,12 +131,16 @@
 #define DPR_TRILINEAR 2
 #define DPR_NO_TEXTURE 0xffffffffu
 
+/// Lenses of ViewParams.distorts.
+#define DPR_BROWN 1
+#define DPR_FISHEYE 2
+
 /// Channels that the transform's backward pass leaves per vertex, to be summed over a view's meshes.
 #define DPR_CHANNEL_MODEL 0       /* rotation vector, translation of the model matrix: 6 */
 #define DPR_CHANNEL_VIEW 6        /* rotation vector, translation of the view matrix: 6 */
 #define DPR_CHANNEL_PROJECTION 12 /* scale x, y, offset x, y of the projection: 4 */
 #define DPR_POSE_CHANNELS 16
-#define DPR_CHANNEL_DISTORTION 16 /* k1, k2, p1, p2, k3, where some view distorts: 5 */
+#define DPR_CHANNEL_DISTORTION 16 /* coefficients of the lens, in its order, where some view distorts: 5 */
 #define DPR_LENS_CHANNELS 21
 #define DPR_CUT_CHANNELS 9 /* of the projection and the distortion, what cuts add where some view distorts */
 

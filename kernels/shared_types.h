@@ -63,11 +63,11 @@ typedef struct ViewParams {
   float4 eye;        /* camera centre, world; w = 1, or 0: the direction to a camera infinitely far away */
   float znear, zfar;
   float inverse_range;   /* 1 / (zfar - znear) */
-  uint distorts;         /* 0: the lens is perfect, and the rest not read */
-  float radial[3];       /* k1, k2, k3: of squared tangents, their squares and cubes */
+  uint distorts;         /* DPR_BROWN or DPR_FISHEYE; 0: the lens is perfect, and the rest not read */
+  float radial[4];       /* k1, k2, k3, k4: of powers 1 to 4 of the squared tangent, of a fisheye angle */
   float largest_radius2; /* squared tangent from which on points are held: the image folds over there */
-  float tangential[2];   /* OpenCV's p2, -p1: its y axis points down */
-  uint unused0, unused1;
+  float tangential[2];   /* OpenCV's p2, -p1: its y axis points down; 0 of a fisheye */
+  uint unused;
 } ViewParams;
 
 /// A triangle of a view after projection, if it is not dropped.
@@ -203,7 +203,7 @@ typedef struct ViewTangent {
   float4 rotation;    /* a rotation vector on the left of the view matrix */
   float4 translation; /* of the view matrix */
   float4 projection;  /* scale x, y, offset x, y */
-  float4 lens[2];     /* k1, k2, p1, p2; k3 */
+  float4 lens[2];     /* coefficients in the lens' order, then zeros */
   float4 eye;         /* of the camera centre, or of the direction to it */
 } ViewTangent;
 

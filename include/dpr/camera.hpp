@@ -16,27 +16,45 @@ struct Intrinsics {
   bool operator==(const Intrinsics&) const = default;
 };
 
-/// Radial and tangential distortion, with OpenCV's coefficients in OpenCV's order: with x and y in its axes
-/// (y down) over depth and r^2 = x^2 + y^2,
+/// Formula of a lens: Brown's, as cv::projectPoints has it, or that of cv::fisheye::projectPoints.
+enum class LensModel { brown, fisheye };
+
+/// Distortion of a lens, with OpenCV's coefficients. With x and y in OpenCV's axes (y down) over depth,
+/// r^2 = x^2 + y^2 and a = atan r, the angle from the axis, Brown's model shows a point at
 ///
 ///   x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and y' alike with p1 and p2
-///   exchanged.
+///   exchanged,
 ///
-/// It moves vertices. Between them edges and what is on faces stay straight, an edge of length l in tangents
-/// off by up to about 3/4 |k1| l^2 r: subdivide_for_lens() (dpr/subdivision.hpp) cuts faces that are too
-/// large for that. From the radius on where the image would fold over (largest_radius()) points are held at
-/// it. Of faces that cross the near plane what is left is distorted.
+/// and a fisheye, which fisheye() makes, at
+///
+///   x' = x / r a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8), and y' alike.
+///
+/// A fisheye too sees only what lies in front of the near plane, less than 90 degrees from the axis.
+///
+/// The lens moves vertices. Between them edges and what is on faces stay straight, an edge of length l in
+/// tangents off by up to about 3/4 |k1| l^2 r (of a fisheye k1 - 1/3 for k1): subdivide_for_lens()
+/// (dpr/subdivision.hpp) cuts faces that are too large for that. From the radius on where the image would
+/// fold over (largest_radius()) points are held at it. Of faces that cross the near plane what is left is
+/// distorted.
 struct Distortion {
-  float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;  ///< p1 and p2 are 0 of a fisheye
+  float k4 = 0;                                  ///< 0 of Brown's model
+  LensModel model = LensModel::brown;
 
   bool operator==(const Distortion&) const = default;
 };
 
-/// The tangent of the angle from the axis where r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops to rise; infinity
-/// where it never does.
+/// The lens of cv::fisheye. Coefficients of 0 are a lens as well, the equidistant one.
+inline Distortion fisheye(float k1, float k2, float k3, float k4) {
+  return {.k1 = k1, .k2 = k2, .k3 = k3, .k4 = k4, .model = LensModel::fisheye};
+}
+
+/// Tangent of the angle from the axis where the radius x' of a point on the x axis stops rising, without p1
+/// and p2; infinity where it rises everywhere.
 DPR_API double largest_radius(const Distortion& distortion);
 
-/// An OpenGL camera: right-handed, looks down -z, y up. Column vectors.
+/// An OpenGL camera: right-handed, looks down -z, y up. Column vectors. Its field of view is the one without
+/// the lens.
 struct Camera {
   mat4 view{1.0F};              ///< world to camera; affine and invertible
   float fov_y_degrees = 60.0F;  ///< full vertical field of view, in (0, 180); ignored if intrinsics are given

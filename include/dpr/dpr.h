@@ -101,14 +101,15 @@ typedef struct dpr_camera {
    * moved and edges stay straight, so faces should be small. */
   const float* distortion;
   /* Not 0: orthographic, with so many world units from the lower to the upper edge; fx is 0 then, and
-   * distortion NULL. */
+   * distortion and fisheye NULL. */
   float orthographic_height;
+  const float* fisheye; /* k1, k2, k3, k4 of a lens of cv::fisheye, instead of distortion; NULL: none */
 } dpr_camera;
 
 #define DPR_CAMERA_INIT                                                                                    \
   {                                                                                                        \
     sizeof(dpr_camera), {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, 60.0f, 0, 0, 0, 0, 1.0f, 100.0f, \
-        NULL, 0                                                                                            \
+        NULL, 0, NULL                                                                                      \
   }
 
 /* Texture beyond [0, 1]: the image again, the image mirrored at every border, or its border's texels. */

@@ -7,6 +7,7 @@
  *   views                [N, 4, 4]            world to camera, OpenGL axes, acting on column vectors; affine
  *   intrinsics           [N, 4]               fx, fy, cx, cy in pixels from the corner of the top-left pixel
  *                     or [N, 9]               the same, and OpenCV's k1, k2, p1, p2, k3 of the lens
+ *                     or [N, 8]               the same, and k1, k2, k3, k4 of a lens of cv::fisheye
  *                     or [N, 1]               orthographic: world units from the lower to the upper edge
  *   colors               [V, 3] or [N, V, 3]  linear RGB
  *   or face_colors       [F, 3] or [N, F, 3]  white without either

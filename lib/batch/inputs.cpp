@@ -52,7 +52,7 @@ std::size_t count_textures(NamedArrays arrays) {
 
 // Numbers of a view's projection: the height of an orthographic one, the intrinsics, or these and the
 // coefficients of the lens.
-constexpr std::size_t k_orthographic = 1, k_pinhole = 4, k_lens = 9;
+constexpr std::size_t k_orthographic = 1, k_pinhole = 4, k_fisheye = 8, k_brown = 9;
 
 void set_projection(Camera& camera, std::span<const float> k) {
   if (k.size() == k_orthographic) {
@@ -60,7 +60,8 @@ void set_projection(Camera& camera, std::span<const float> k) {
     return;
   }
   camera.intrinsics = Intrinsics{k[0], k[1], k[2], k[3]};
-  if (k.size() == k_lens) camera.distortion = Distortion{k[4], k[5], k[6], k[7], k[8]};
+  if (k.size() == k_brown) camera.distortion = Distortion{k[4], k[5], k[6], k[7], k[8]};
+  if (k.size() == k_fisheye) camera.distortion = fisheye(k[4], k[5], k[6], k[7]);
 }
 
 int texture_side(std::size_t texels, const NamedArray& texture) {
@@ -166,6 +167,7 @@ std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
                                       Path{"materials.shininess", "meshes[].shininess"},
                                       Path{"intrinsics", "camera.intrinsics."},
                                       Path{"intrinsics", "camera.distortion."},
+                                      Path{"intrinsics", "camera.fisheye."},
                                       Path{"intrinsics", "camera.orthographic_height"},
                                       Path{"background", "background"},
                                       Path{"sigma", "sigma"},
@@ -210,8 +212,8 @@ BatchSizes check_sizes(NamedArrays arrays) {
   const std::size_t of_mesh = vertices.shape[vertices.shape.size() - 2];
   const std::string rows = std::to_string(count);
   require_form(require(arrays, "intrinsics"), Element::float32,
-               {{count, k_pinhole}, {count, k_lens}, {count, k_orthographic}},
-               "[" + rows + ", 4] or [" + rows + ", 9] or [" + rows + ", 1]");
+               {{count, k_pinhole}, {count, k_brown}, {count, k_fisheye}, {count, k_orthographic}},
+               "[" + rows + ", 4], [" + rows + ", 9], [" + rows + ", 8] or [" + rows + ", 1]");
   if (const NamedArray* const background = find(arrays, "background"))
     require_floats(*background, {3}, "[3]");
   if (find(arrays, "colors") && find(arrays, "face_colors"))

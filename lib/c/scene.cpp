@@ -46,7 +46,10 @@ Camera to_camera(const dpr_camera* camera, const char* argument) {
                    .znear = c.znear,
                    .zfar = c.zfar};
   if (c.fx != 0) converted.intrinsics = Intrinsics{c.fx, c.fy, c.cx, c.cy};
+  if (c.distortion != nullptr && c.fisheye != nullptr)
+    throw InvalidArgument(checks::in("distortion and fisheye", argument), "both", "one of them, or none");
   if (const float* const k = c.distortion) converted.distortion = Distortion{k[0], k[1], k[2], k[3], k[4]};
+  if (const float* const k = c.fisheye) converted.distortion = fisheye(k[0], k[1], k[2], k[3]);
   if (c.orthographic_height != 0) converted.orthographic_height = c.orthographic_height;
   validate(converted, argument);
   return converted;

@@ -12,6 +12,7 @@
 #include "dpr/renderer.hpp"
 #include "reference/mesh_loss.hpp"
 #include "reference/renderer.hpp"
+#include "scene/lens.hpp"
 #include "scene/light_table.hpp"
 
 namespace dpr::check {
@@ -45,6 +46,12 @@ inline reference::Image to_reference(const Image& image) {
 /// The reference's are in the same order.
 inline reference::Prior to_reference(Prior prior) { return static_cast<reference::Prior>(prior); }
 
+inline reference::Distortion to_reference(const Distortion& lens) {
+  reference::Distortion result{.is_fisheye = lens.model == LensModel::fisheye};
+  std::ranges::copy(coefficients(lens), result.coefficients.begin());
+  return result;
+}
+
 inline reference::Camera to_reference(const Camera& camera) {
   reference::Camera result{
       to_reference(camera.view), camera.fov_y_degrees, {}, camera.znear, camera.zfar, {}, {}};
@@ -52,10 +59,7 @@ inline reference::Camera to_reference(const Camera& camera) {
     const Intrinsics& k = *camera.intrinsics;
     result.intrinsics = {k.fx, k.fy, k.cx, k.cy};
   }
-  if (camera.distortion) {
-    const Distortion& d = *camera.distortion;
-    result.distortion = {d.k1, d.k2, d.p1, d.p2, d.k3};
-  }
+  if (camera.distortion) result.distortion = to_reference(*camera.distortion);
   if (camera.orthographic_height) result.orthographic_height = *camera.orthographic_height;
   return result;
 }
@@ -229,7 +233,9 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
   add("fov", {camera.fov_y_degrees});
   add("intrinsics", {camera.intrinsics.begin(), camera.intrinsics.end()});
   add("orthographic height", {camera.orthographic_height});
-  add("distortion", {camera.distortion.begin(), camera.distortion.end()});
+  std::vector<double> lens(camera.distortion.begin(), camera.distortion.end());
+  for (std::size_t k = 0; k < camera.fisheye.size(); ++k) lens[k] += camera.fisheye[k];  // one of them is 0
+  add("distortion", lens);
   add("sigma", {found.sigma});
   add("gamma", {found.gamma});
   add("alpha", {found.alpha});

@@ -237,7 +237,9 @@ std::string camera_text(const Json& camera) {
   } else {
     lens = camera["fov_y_degrees"].dump() + " degrees high";
   }
-  if (camera.contains("distortion")) lens += ", distortion " + list_text(camera["distortion"]);
+  for (const char* const model : {"distortion", "fisheye"}) {
+    if (camera.contains(model)) lens += ", " + std::string(model) + " " + list_text(camera[model]);
+  }
   return lens + ", depths from " + camera["znear"].dump() + " to " + camera["zfar"].dump();
 }
 

@@ -5,6 +5,7 @@
 
 #include "base/from_chars.hpp"
 #include "base/output_file.hpp"
+#include "scene/lens.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -98,10 +99,14 @@ Json camera_to_json(const Camera& camera) {
   } else {
     json["fov_y_degrees"] = number(camera.fov_y_degrees);
   }
-  if (const auto& d = camera.distortion) {
-    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
-  }
+  add_lens(json, camera);
   return json;
+}
+
+void add_lens(Json& json, const Camera& camera) {
+  if (!camera.distortion) return;
+  Json& list = json[camera.distortion->model == LensModel::fisheye ? "fisheye" : "distortion"];
+  for (const float coefficient : coefficients(*camera.distortion)) list.push_back(number(coefficient));
 }
 
 std::string to_text(const Json& json) {

@@ -30,6 +30,8 @@ Json rows_to_json(const glm::dmat4& matrix);
 
 /// As scenes have it, without its view.
 Json camera_to_json(const Camera& camera);
+/// Adds the coefficients of a camera's lens, if it has one, as scenes have them.
+void add_lens(Json& json, const Camera& camera);
 
 /// Objects and lists of lists over several lines, lists of numbers on one.
 std::string to_text(const Json& json);

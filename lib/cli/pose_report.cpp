@@ -173,8 +173,7 @@ Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene, co
       json["transforms"].push_back(rows_to_json(glm::dmat4(transforms[part.mesh])));
     }
   }
-  if (const auto& d = calibrated(scene.camera, 1, hypothesis.radial).distortion)
-    json["distortion"] = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  add_lens(json, calibrated(scene.camera, 1, hypothesis.radial));
   return json;
 }
 

@@ -113,7 +113,7 @@ inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, const P
 struct ClippedGradient {
   HomogeneousFace corners{};
   Projection projection;
-  Distortion distortion{};
+  Coefficients distortion{};
 };
 
 /// Differences of clipped_forward(), which must have a fragment there.
@@ -149,7 +149,7 @@ inline ClippedGradient clipped_backward(const HomogeneousFace& h, const Projecti
   grad.projection.offset = {slope([](Projection& with) -> double& { return with.offset.x; }),
                             slope([](Projection& with) -> double& { return with.offset.y; })};
   for (std::size_t k = 0; k < grad.distortion.size(); ++k)
-    grad.distortion[k] = slope([&](Projection& with) -> double& { return (*with.distortion)[k]; });
+    grad.distortion[k] = slope([&](Projection& with) -> double& { return with.distortion->coefficients[k]; });
   return grad;
 }
 

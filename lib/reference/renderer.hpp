@@ -35,7 +35,7 @@ struct CameraGradient {
   double fov_y_degrees = 0.0;
   Intrinsics intrinsics;
   double orthographic_height = 0.0;
-  Distortion distortion{};
+  Coefficients distortion{};
 };
 
 struct Gradients {

@@ -35,13 +35,37 @@ struct Intrinsics {
   double cy = 0.0;
 };
 
-/// OpenCV's coefficients k1, k2, p1, p2, k3.
-using Distortion = std::array<double, 5>;
+/// OpenCV's k1, k2, p1, p2, k3, or of its fisheye k1, k2, k3, k4, 0.
+using Coefficients = std::array<double, 5>;
+
+struct Distortion {
+  Coefficients coefficients{};
+  bool is_fisheye = false;
+};
+
+/// Angle at which a fisheye shows a point that many radians from the axis, and the derivative.
+struct ShownAngle {
+  double value = 0.0;
+  double slope = 0.0;
+};
+inline ShownAngle shown_angle(const Coefficients& k, double angle) {
+  ShownAngle shown{angle, 1.0};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double power = 2.0 * static_cast<double>(i) + 3.0;
+    shown.value += k[i] * std::pow(angle, power);
+    shown.slope += k[i] * power * std::pow(angle, power - 1.0);
+  }
+  return shown;
+}
 
 /// A point of OpenCV's normalised image plane, y down, and where its lens shows it; as its documentation has
 /// it.
-inline Vec2d distorted(const Distortion& k, const Vec2d& point) {
-  const auto [k1, k2, p1, p2, k3] = k;
+inline Vec2d distorted(const Distortion& lens, const Vec2d& point) {
+  if (lens.is_fisheye) {
+    const double r = std::hypot(point.x, point.y);
+    return r > 0.0 ? shown_angle(lens.coefficients, std::atan(r)).value / r * point : point;
+  }
+  const auto [k1, k2, p1, p2, k3] = lens.coefficients;
   const double x = point.x, y = point.y, r2 = x * x + y * y;
   const double radial = 1.0 + k1 * r2 + k2 * r2 * r2 + k3 * r2 * r2 * r2;
   return {x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
@@ -50,11 +74,25 @@ inline Vec2d distorted(const Distortion& k, const Vec2d& point) {
 
 struct DistortedGradient {
   Vec2d point;
-  Distortion coefficients{};
+  Coefficients coefficients{};
 };
 
-inline DistortedGradient distorted_backward(const Distortion& k, const Vec2d& point, const Vec2d& grad) {
-  const auto [k1, k2, p1, p2, k3] = k;
+/// Along the direction from the axis a point moves by the slope of the angle shown, across it by the factor.
+inline DistortedGradient fisheye_backward(const Coefficients& k, const Vec2d& point, const Vec2d& grad) {
+  const double r = std::hypot(point.x, point.y);
+  if (r == 0.0) return {grad, {}};
+  const double angle = std::atan(r), along = dot(grad, point) / r;
+  const ShownAngle shown = shown_angle(k, angle);
+  const double across_factor = shown.value / r, along_factor = shown.slope / (1.0 + r * r);
+  DistortedGradient g{across_factor * grad + (along_factor - across_factor) * along / r * point, {}};
+  for (std::size_t i = 0; i < 4; ++i)
+    g.coefficients[i] = along * std::pow(angle, 2.0 * static_cast<double>(i) + 3.0);
+  return g;
+}
+
+inline DistortedGradient distorted_backward(const Distortion& lens, const Vec2d& point, const Vec2d& grad) {
+  if (lens.is_fisheye) return fisheye_backward(lens.coefficients, point, grad);
+  const auto [k1, k2, p1, p2, k3] = lens.coefficients;
   const double x = point.x, y = point.y, r2 = x * x + y * y;
   const double radial = 1.0 + k1 * r2 + k2 * r2 * r2 + k3 * r2 * r2 * r2;
   const double slope = k1 + 2.0 * k2 * r2 + 3.0 * k3 * r2 * r2;  // of `radial`, by r2
@@ -171,7 +209,7 @@ struct TransformGradient {
   Vec3d view_rotation;
   Vec3d view_translation;
   Projection projection;  ///< of scale and offset
-  Distortion distortion{};
+  Coefficients distortion{};
 };
 
 /// The gradients by way of NDC x, y and depth.

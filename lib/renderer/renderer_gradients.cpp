@@ -141,6 +141,15 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
   for (std::size_t k = 0; k < 4; ++k) out.intrinsics[k] = grad[k] * slopes.by_intrinsics[k];
 }
 
+/// Sets the derivatives of the coefficients of a camera's lens, which are in the lens' order.
+void set_lens(CameraGradient& gradient, const Camera& camera, const std::array<double, 5>& lens) {
+  if (camera.distortion && camera.distortion->model == LensModel::fisheye) {
+    std::copy_n(lens.begin(), gradient.fisheye.size(), gradient.fisheye.begin());
+  } else {
+    gradient.distortion = lens;
+  }
+}
+
 /// The derivatives of poses and cameras, from sums by [DPR_POSE_CHANNELS or DPR_LENS_CHANNELS][view][mesh], and
 /// two by [DPR_CUT_CHANNELS][view], or none.
 void add_pose_gradients(std::span<const float> sums, const std::array<std::span<const float>, 2>& of_cuts,
@@ -155,7 +164,7 @@ void add_pose_gradients(std::span<const float> sums, const std::array<std::span<
   for (std::size_t v = 0; v < views.size(); ++v) {
     CameraGradient camera;
     std::array<double, 4> projected{};
-    std::array<double, 5> distortion{};
+    std::array<double, 5> lens{};
     for (std::size_t m = 0; m < meshes; ++m) {
       const std::size_t segment = v * meshes + m;
       if (scene.gradients.transform) {
@@ -166,16 +175,16 @@ void add_pose_gradients(std::span<const float> sums, const std::array<std::span<
       camera.view.translation += sum3(DPR_CHANNEL_VIEW + 3, segment);
       for (std::size_t k = 0; k < 4; ++k) projected[k] += sum(DPR_CHANNEL_PROJECTION + k, segment);
       for (std::size_t k = 0; k < 5 && views[v].camera.distortion; ++k)
-        distortion[k] += sum(DPR_CHANNEL_DISTORTION + k, segment);
+        lens[k] += sum(DPR_CHANNEL_DISTORTION + k, segment);
     }
     for (const std::span<const float> cuts : of_cuts) {
       if (cuts.empty() || !views[v].camera.distortion) continue;
       for (std::size_t k = 0; k < DPR_CUT_CHANNELS; ++k)
-        (k < 4 ? projected[k] : distortion[k - 4]) += static_cast<double>(cuts[k * views.size() + v]);
+        (k < 4 ? projected[k] : lens[k - 4]) += static_cast<double>(cuts[k * views.size() + v]);
     }
     add_projection_gradient(projected, views[v].camera, scene.width, scene.height, camera);
     if (scene.gradients.camera) gradient.views[v].camera = camera;
-    if (scene.gradients.distortion) gradient.views[v].camera.distortion = distortion;
+    if (scene.gradients.distortion) set_lens(gradient.views[v].camera, views[v].camera, lens);
   }
 }
 

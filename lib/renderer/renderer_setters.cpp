@@ -24,10 +24,11 @@ cl_float4 matrix_row(const glm::mat4& m, int row) { return {{m[0][row], m[1][row
 
 void set_distortion(shared::ViewParams& v, const Distortion& d) {
   const double radius = largest_radius(d);
-  v.distorts = 1;
+  v.distorts = d.model == LensModel::fisheye ? DPR_FISHEYE : DPR_BROWN;
   v.radial[0] = d.k1;
   v.radial[1] = d.k2;
   v.radial[2] = d.k3;
+  v.radial[3] = d.k4;
   v.largest_radius2 = static_cast<float>(radius * radius);
   v.tangential[0] = d.p2;
   v.tangential[1] = -d.p1;

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
-#include <limits>
+#include <string>
 #include <utility>
-#include <vector>
 
 #include "base/checks.hpp"
 
@@ -19,36 +18,7 @@ const glm::mat4 k_opengl_to_opencv(glm::vec4(1, 0, 0, 0), glm::vec4(0, -1, 0, 0)
 const glm::mat4 k_opengl_to_pytorch3d(glm::vec4(-1, 0, 0, 0), glm::vec4(0, 1, 0, 0), glm::vec4(0, 0, -1, 0),
                                       glm::vec4(0, 0, 0, 1));
 
-/// The slope of r (1 + k1 r^2 + k2 r^4 + k3 r^6), by s = r^2.
-double radial_slope(const Distortion& d, double s) {
-  return 1 + s * (3.0 * d.k1 + s * (5.0 * d.k2 + s * 7.0 * d.k3));
-}
-
-/// Extremes of the slope in [0, most], ascending, with the two ends.
-std::vector<double> slope_extremes(const Distortion& d, double most) {
-  const double a = 21.0 * d.k3, b = 10.0 * d.k2, c = 3.0 * d.k1;  // a s^2 + b s + c
-  const double discriminant = b * b - 4 * a * c;
-  const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));  // a NaN where there are none
-  std::vector<double> extremes{0.0, q / a, c / q, most};
-  std::erase_if(extremes, [&](double s) { return !(s >= 0 && s <= most); });
-  std::ranges::sort(extremes);
-  return extremes;
-}
-
 }  // namespace
-
-double largest_radius(const Distortion& distortion) {
-  constexpr double k_most = 1e12;  // squared radius: as good as behind the camera
-  const std::vector<double> extremes = slope_extremes(distortion, k_most);
-  for (std::size_t i = 1; i < extremes.size(); ++i) {
-    double low = extremes[i - 1], high = extremes[i];
-    if (radial_slope(distortion, high) > 0) continue;
-    for (double middle = 0.5 * (low + high); middle > low && middle < high; middle = 0.5 * (low + high))
-      (radial_slope(distortion, middle) > 0 ? low : high) = middle;
-    return std::sqrt(low);
-  }
-  return std::numeric_limits<double>::infinity();
-}
 
 Projection projection(const Camera& camera, int width, int height) {
   const double short_side = std::min(width, height);
@@ -72,16 +42,27 @@ Projection projection(const Camera& camera, int width, int height) {
 namespace {
 
 void validate(const Distortion& d, const std::string& name) {
-  const std::pair<const char*, float> coefficients[] = {
-      {"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1}, {"p2", d.p2}, {"k3", d.k3}};
+  const std::pair<const char*, float> coefficients[] = {{"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1},
+                                                        {"p2", d.p2}, {"k3", d.k3}, {"k4", d.k4}};
   for (const auto& [key, value] : coefficients) checks::require_finite(value, checks::in(key, name));
+  const auto require_zero = [&](float value, const char* key, const char* of) {
+    if (value != 0)
+      throw InvalidArgument(checks::in(key, name), checks::text(value), std::string("0 of ") + of);
+  };
+  if (d.model == LensModel::fisheye) {
+    require_zero(d.p1, "p1", "a fisheye");
+    require_zero(d.p2, "p2", "a fisheye");
+  } else {
+    require_zero(d.k4, "k4", "Brown's model");
+  }
 }
 
 }  // namespace
 
 void validate(const Camera& camera, const std::string& name) {
   checks::require_affine(camera.view, checks::in("view", name));
-  if (camera.distortion) validate(*camera.distortion, name + ".distortion");
+  if (const auto& lens = camera.distortion)
+    validate(*lens, name + (lens->model == LensModel::fisheye ? ".fisheye" : ".distortion"));
   if (camera.orthographic_height) {
     checks::require_positive(*camera.orthographic_height, checks::in("orthographic_height", name));
     if (camera.intrinsics || camera.distortion) {

@@ -30,7 +30,11 @@ bool has_field_of_view(const Scene& scene) {
   return !scene.camera.intrinsics && !scene.camera.orthographic_height;
 }
 bool has_intrinsics(const Scene& scene) { return scene.camera.intrinsics.has_value(); }
-bool has_distortion(const Scene& scene) { return scene.camera.distortion.has_value(); }
+bool has_lens(const Scene& scene, LensModel model) {
+  return scene.camera.distortion && scene.camera.distortion->model == model;
+}
+bool has_distortion(const Scene& scene) { return has_lens(scene, LensModel::brown); }
+bool has_fisheye(const Scene& scene) { return has_lens(scene, LensModel::fisheye); }
 bool is_orthographic(const Scene& scene) { return scene.camera.orthographic_height.has_value(); }
 bool has_lights(const Scene& scene) { return scene.lights.has_value(); }
 bool has_harmonics(const Scene& scene) { return has_lights(scene) && !scene.lights->harmonics.empty(); }
@@ -48,6 +52,11 @@ GradientArray intrinsic(G& g, I i) {
 template <std::size_t k>
 GradientArray coefficient(G& g, I i) {
   return &g.views[i.view].camera.distortion[k];
+}
+
+template <std::size_t k>
+GradientArray of_fisheye(G& g, I i) {
+  return &g.views[i.view].camera.fisheye[k];
 }
 
 /// Rows of a kind of light. Files have the list of point lights even where there are none.
@@ -103,6 +112,10 @@ std::vector<GradientRow> make_rows() {
       GradientRow{&Request::distortion, Of::view, "camera.distortion.p1", coefficient<2>, has_distortion},
       GradientRow{&Request::distortion, Of::view, "camera.distortion.p2", coefficient<3>, has_distortion},
       GradientRow{&Request::distortion, Of::view, "camera.distortion.k3", coefficient<4>, has_distortion},
+      GradientRow{&Request::distortion, Of::view, "camera.fisheye.k1", of_fisheye<0>, has_fisheye},
+      GradientRow{&Request::distortion, Of::view, "camera.fisheye.k2", of_fisheye<1>, has_fisheye},
+      GradientRow{&Request::distortion, Of::view, "camera.fisheye.k3", of_fisheye<2>, has_fisheye},
+      GradientRow{&Request::distortion, Of::view, "camera.fisheye.k4", of_fisheye<3>, has_fisheye},
       GradientRow{&Request::lights, Of::scene, "lights.ambient",
                   [](G& g, I) -> GradientArray { return &g.ambient; }, has_lights},
       GradientRow{&Request::lights, Of::scene, "lights.harmonics",

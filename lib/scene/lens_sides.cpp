@@ -4,14 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "scene/lens.hpp"
+
 namespace dpr {
-namespace {
-
-double radial_stretch(const Distortion& d, double radius2) {
-  return 1 + radius2 * (d.k1 + radius2 * (d.k2 + radius2 * double{d.k3}));
-}
-
-}  // namespace
 
 LensSides::LensSides(const Camera& camera, const glm::mat4& model, int width, int height,
                      double tolerance_pixels)
@@ -31,7 +26,7 @@ glm::dvec2 LensSides::bend(glm::dvec2 t) const {
   if (radius > largest_radius_) t *= largest_radius_ / radius;
   const double radius2 = glm::dot(t, t);
   const glm::dvec2 q(distortion_.p2, -distortion_.p1);
-  return t * (radial_stretch(distortion_, radius2) + 2 * glm::dot(q, t)) + q * radius2;
+  return t * (radial_factor(distortion_, radius2) + 2 * glm::dot(q, t)) + q * radius2;
 }
 
 double LensSides::visible_radius(int width, int height) const {
@@ -45,7 +40,7 @@ double LensSides::visible_radius(int width, int height) const {
   const double tangential = 3 * std::hypot(distortion_.p1, distortion_.p2);
   double visible = std::numeric_limits<double>::infinity();
   for (double r = std::min(largest_radius_, k_widest); r > k_least; r *= k_step) {
-    if (r * radial_stretch(distortion_, r * r) - tangential * r * r < furthest)
+    if (r * radial_factor(distortion_, r * r) - tangential * r * r < furthest)
       break;  // the least it is shown at
     visible = r;
   }

@@ -10,26 +10,17 @@
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
-#include "base/name_list.hpp"
 #include "dpr/scene.hpp"
 #include "image/texture_words.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
+#include "scene/take_json.hpp"
 #include "smoothing/choice_names.hpp"
 #include "smoothing/option_fields.hpp"
 
 namespace dpr {
 namespace {
-
-template <typename Value, typename Parse>
-void take(const JsonNode& node, std::string_view key, Value& value, Parse parse) {
-  if (const auto member = node.find(key)) value = parse(*member);
-}
-
-void take_number(const JsonNode& node, std::string_view key, float& value) {
-  take(node, key, value, [](const JsonNode& n) { return n.number(); });
-}
 
 void take_vec3(const JsonNode& node, std::string_view key, glm::vec3& value) {
   take(node, key, value, [](const JsonNode& n) { return n.vec3(); });
@@ -82,14 +73,6 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
   if (colors.size() != count) {
     given.fail(std::to_string(colors.size()) + " colours", "one, or " + std::to_string(count));
   }
-}
-
-/// A value of an enumeration, by its name.
-template <typename Word>
-void take_word(const JsonNode& node, std::string_view key, Word& value,
-               std::span<const std::string_view> names) {
-  take(node, key, value,
-       [names](const JsonNode& n) { return static_cast<Word>(position_of(n.string(), names, n.name())); });
 }
 
 // A texture beside a file takes the place of all of the file's.
@@ -272,47 +255,7 @@ std::string key_of(const std::string& argument) {
   return parent == "scene" ? field : parent + "." + field;
 }
 
-Distortion parse_distortion(const JsonNode& node) {
-  const std::vector<JsonNode> k = node.elements(5);
-  return {k[0].number(), k[1].number(), k[2].number(), k[3].number(), k[4].number()};
-}
-
-/// "orthographic" or "perspective", and what belongs to it.
-void take_projection(const JsonNode& node, Camera& camera) {
-  enum class Kind { perspective, orthographic } kind{};
-  constexpr std::array<std::string_view, 2> k_kinds{"perspective", "orthographic"};
-  take_word(node, "projection", kind, k_kinds);
-  if (kind == Kind::perspective) {
-    if (node.find("orthographic_height"))
-      node.fail("orthographic_height without orthographic projection", "\"projection\": \"orthographic\"");
-    return;
-  }
-  for (const char* const key : {"fov_y_degrees", "intrinsics", "distortion"}) {
-    if (node.find(key)) node.fail(std::string(key) + " and an orthographic projection", "one of the two");
-  }
-  camera.orthographic_height = node.at("orthographic_height").number();
-}
-
 }  // namespace
-
-Camera parse_camera(const JsonNode& node) {
-  node.require_keys({"view", "fov_y_degrees", "intrinsics", "distortion", "projection", "orthographic_height",
-                     "znear", "zfar"});
-  Camera camera;
-  take(node, "view", camera.view, [](const JsonNode& n) { return n.mat4(); });
-  take_number(node, "fov_y_degrees", camera.fov_y_degrees);
-  take_number(node, "znear", camera.znear);
-  take_number(node, "zfar", camera.zfar);
-  take(node, "distortion", camera.distortion, parse_distortion);
-  take_projection(node, camera);
-  const auto intrinsics = node.find("intrinsics");
-  if (!intrinsics) return camera;
-  if (node.find("fov_y_degrees")) node.fail("fov_y_degrees and intrinsics", "one of the two");
-  intrinsics->require_keys({"fx", "fy", "cx", "cy"});
-  camera.intrinsics = Intrinsics{intrinsics->at("fx").number(), intrinsics->at("fy").number(),
-                                 intrinsics->at("cx").number(), intrinsics->at("cy").number()};
-  return camera;
-}
 
 SmoothingOptions parse_smoothing(const JsonNode& node) {
   node.require_keys(option_keys());

@@ -1,5 +1,6 @@
 // Fingerprint of a fit's views, start and options, by which a checkpoint is recognised.
 #include "base/hash.hpp"
+#include "scene/lens.hpp"
 #include "scene/light_table.hpp"
 #include "solve/shape_state.hpp"
 
@@ -14,8 +15,8 @@ void add(Hash& hash, const Camera& camera) {
   for (const float value : {camera.fov_y_degrees, camera.znear, camera.zfar, k.fx, k.fy, k.cx, k.cy})
     hash.add(value);
   if (camera.distortion) {
-    const Distortion& d = *camera.distortion;
-    for (const float value : {d.k1, d.k2, d.p1, d.p2, d.k3}) hash.add(value);
+    for (const float value : coefficients(*camera.distortion)) hash.add(value);
+    if (camera.distortion->model == LensModel::fisheye) hash.add(1);  // not Brown's without k3
   }
   if (camera.orthographic_height) hash.add(*camera.orthographic_height);
 }

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <variant>
 
+#include "scene/lens.hpp"
 #include "solve/pose_window.hpp"
 #include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
@@ -39,19 +40,6 @@ std::vector<glm::dvec3> outermost(const Scene& scene, const PoseBody& body) {
         *std::ranges::max_element(of_parts, {}, [&](const glm::dvec3& p) { return glm::dot(p, direction); }));
   }
   return points;
-}
-
-/// The tangents at which a lens sees what is seen at these without it, by fixed-point steps on the radial part.
-glm::dvec2 undistorted(const glm::dvec2& seen, const std::optional<Distortion>& lens) {
-  constexpr int k_steps = 8;
-  if (!lens) return seen;
-  glm::dvec2 tangents = seen;
-  for (int i = 0; i < k_steps; ++i) {
-    const double r2 = std::min(glm::dot(tangents, tangents), std::pow(largest_radius(*lens), 2.0));
-    const double factor = 1 + r2 * (double{lens->k1} + r2 * (double{lens->k2} + r2 * double{lens->k3}));
-    tangents = seen / std::max(factor, 0.1);
-  }
-  return tangents;
 }
 
 /// Tangents from the axis, x right and y up, at a place of the image in pixels.

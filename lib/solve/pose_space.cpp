@@ -14,6 +14,10 @@ namespace {
 
 constexpr std::size_t k_translation = 3;  // where its parameters begin
 
+bool is_fisheye(const Camera& camera) {
+  return camera.distortion && camera.distortion->model == LensModel::fisheye;
+}
+
 /// The lens that a camera has, and where it is not known some as strong as there are.
 std::vector<Camera> possible_lenses(const Camera& camera, bool is_unknown) {
   constexpr double k_strong = 0.3;
@@ -57,6 +61,7 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions&
   const glm::dvec3 centre(view * glm::dvec4(initial.translation, 1.0));
   distance_ = std::max(-centre.z, static_cast<double>(scene.camera.znear));
   rim_ = (glm::length(glm::dvec2(centre)) + radius_) / distance_;
+  if (is_fisheye(scene.camera)) rim_ = std::atan(rim_);
   const glm::vec2 scale = projection(scene.camera, scene.width, scene.height).scale;
   const double divisor = is_perspective_ ? distance_ : 1.0;
   ndc_per_tangent_ = static_cast<double>(std::max(scale.x, scale.y));
@@ -126,7 +131,8 @@ ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera&
   } else if (parameter < radial_index_) {
     tangent.camera = zoom_tangent(calibrated(camera, hypothesis.focal_scale, hypothesis.radial));
   } else {
-    tangent.camera.distortion[parameter - radial_index_] = 1;
+    const std::size_t k = parameter - radial_index_;
+    (is_fisheye(camera) ? tangent.camera.fisheye[k] : tangent.camera.distortion[k]) = 1;
   }
   return tangent;
 }

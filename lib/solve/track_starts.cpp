@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "scene/lens.hpp"
 #include "solve/pose_beam.hpp"
 #include "solve/resample.hpp"
 
@@ -15,7 +16,8 @@ namespace {
 glm::dvec3 seen_at(const Scene& scene, const glm::dvec2& ndc, double depth) {
   const Projection p = projection(scene.camera, scene.width, scene.height);
   const double unit = scene.camera.orthographic_height ? 1.0 : depth;
-  const glm::dvec2 xy = unit * (ndc - glm::dvec2(p.offset)) / glm::dvec2(p.scale);
+  const glm::dvec2 seen = (ndc - glm::dvec2(p.offset)) / glm::dvec2(p.scale);
+  const glm::dvec2 xy = unit * undistorted(seen, scene.camera.distortion);
   return glm::dvec3(glm::inverse(glm::dmat4(scene.camera.view)) * glm::dvec4(xy.x, xy.y, -depth, 1));
 }
 

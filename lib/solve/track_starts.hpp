@@ -15,7 +15,7 @@ std::vector<Hypothesis> hypotheses_about(const Pose& pose, const PoseSpace& spac
                                          bool solves_translation);
 
 /// Some `rotations` in all, spread over all rotations at a place or, where the translation is looked for, at places
-/// all over the image at the depth of that place too. A lens is left out.
+/// all over the image at the depth of that place too.
 std::vector<Hypothesis> hypotheses_everywhere(const glm::dvec3& place, const PoseSpace& space,
                                               const Scene& scene, std::size_t rotations,
                                               bool solves_translation);

@@ -1485,12 +1485,14 @@ static void test_wrong_meshes(dpr_scene* scene) {
 /* The lens' own gradients, and an orthographic camera's. */
 static void test_cameras(const dpr_device* device) {
   const float barrel[5] = {-0.2f, 0.1f, 0, 0, 0}, nan[5] = {0, NAN, 0, 0, 0};
+  const float fisheye[4] = {0.1f, -0.05f, 0.02f, 0};
   const char* const wanted[] = {"camera", "distortion"};
-  const char* const names[] = {"views[0].camera.distortion.k1", "views[0].camera.orthographic_height"};
+  const char* const names[] = {"views[0].camera.distortion.k1", "views[0].camera.orthographic_height",
+                               "views[0].camera.fisheye.k4"};
   float ones[FLOATS];
   size_t i, kind;
   for (i = 0; i < FLOATS; ++i) ones[i] = (float)i;
-  for (kind = 0; kind < 2; ++kind) {
+  for (kind = 0; kind < 3; ++kind) {
     double slope = 0;
     dpr_scene* scene = make_scene();
     dpr_renderer* renderer = NULL;
@@ -1498,6 +1500,7 @@ static void test_cameras(const dpr_device* device) {
     dpr_camera camera = three_units_away();
     if (kind == 0) camera.distortion = barrel;
     if (kind == 1) camera.orthographic_height = 3;
+    if (kind == 2) camera.fisheye = fisheye;
     OK(dpr_scene_set_gradients(scene, wanted, 2));
     OK(dpr_scene_set_camera(scene, &camera));
     OK(dpr_renderer_create(device, &renderer));
@@ -1506,7 +1509,7 @@ static void test_cameras(const dpr_device* device) {
     OK(dpr_backward_pixels(renderer, ones, FLOATS, &gradient));
     OK(dpr_gradient_read(gradient, names[kind], &slope, 1));
     EXPECT(slope != 0);
-    REFUSED(dpr_gradient_read(gradient, names[1 - kind], &slope, 1), "name (gradient)");
+    REFUSED(dpr_gradient_read(gradient, names[(kind + 1) % 3], &slope, 1), "name (gradient)");
     dpr_gradient_destroy(gradient);
     gradient = NULL;
     camera = three_units_away(); /* a view's camera has what it has, whatever the scene's */
@@ -1520,6 +1523,14 @@ static void test_cameras(const dpr_device* device) {
     REFUSED(dpr_gradient_read(gradient, names[kind], &slope, 1), "name (gradient)");
     camera.distortion = nan;
     REFUSED(dpr_scene_set_camera(scene, &camera), "k2");
+    camera.fisheye = fisheye;
+    REFUSED(dpr_scene_set_camera(scene, &camera), "distortion and fisheye");
+    camera.distortion = NULL;
+    OK(dpr_scene_set_camera(scene, &camera));
+    camera.fisheye = nan;
+    REFUSED(dpr_scene_set_camera(scene, &camera), "k2 (camera.fisheye)");
+    camera.size = offsetof(dpr_camera, fisheye); /* a program compiled before there were fisheyes */
+    OK(dpr_scene_set_camera(scene, &camera));
     dpr_gradient_destroy(gradient);
     dpr_renderer_destroy(renderer);
     dpr_scene_destroy(scene);

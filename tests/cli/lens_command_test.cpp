@@ -23,10 +23,10 @@ using dpr::test::TempDir;
 using nlohmann::json;
 
 /// A wall before the camera.
-std::string scene_text(const std::string& distortion) {
+std::string scene_text(const std::string& lens) {
   return R"({"width": 48, "height": 36, "camera": {"intrinsics": {"fx": 24, "fy": 24, "cx": 24, "cy": 18},
              "znear": 0.5, "zfar": 10)" +
-         distortion +
+         lens +
          R"(}, "meshes": [{"positions": [[-1.3,-1,-1.6],[1.4,-0.9,-1.9],[1.3,1.2,-2.1],[-1.4,1.1,-1.8]],
              "faces": [[0,1,2],[0,2,3]], "face_colors": [[1,0,0],[0,0,1]]}]})";
 }
@@ -71,6 +71,21 @@ TEST_SUITE("pipeline") {
         run_command(folder, {"render", "--scene", "lens.json", "-o", "no.exr", "--lens-tolerance", "-1"});
     CHECK(wrong.status == 1);
     CHECK(contains(wrong.err, "--lens-tolerance (command line): got -1"));
+  }
+
+  TEST_CASE("the commands take a fisheye") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    std::string scene = scene_text(R"(, "fisheye": [-0.25, 0.125, 0, 0.5])");
+    scene.insert(1, R"("gradients": ["distortion"], )");
+    folder.write("fisheye.json", scene);
+    const std::string said = succeed(folder, {"render", "--scene", "fisheye.json", "-o", "cut.exr"}).out;
+    CHECK(contains(said, "2 triangles, cut into "));
+    succeed(folder, {"gradient", "--scene", "fisheye.json", "--target", "cut.exr", "-o", "g.json"});
+    const json of_lens = json::parse(folder.read("g.json"))["camera"]["fisheye"];
+    CHECK(of_lens.size() == 4);
+    CHECK(of_lens.contains("k4"));
+    CHECK(contains(succeed(folder, {"info", "fisheye.json"}).out, "fisheye -0.25 0.125 0.0 0.5"));
   }
 }
 

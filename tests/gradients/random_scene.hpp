@@ -118,7 +118,11 @@ inline void draw_camera(Draw& draw, Trial& trial) {
   const std::size_t kind = draw.below(5);
   if (kind == 1) camera.orthographic_height = 3.9F;
   if (kind == 2) camera.intrinsics = {1.3F * pixels, 1.4F * pixels, 0.52F * pixels, 0.47F * pixels};
-  if (kind == 3) camera.distortion = {draw.between(-0.2F, 0.2F), 0.05F, 0.01F, -0.02F, 0.01F};
+  if (kind == 3) {
+    const float k1 = draw.between(-0.2F, 0.2F);
+    camera.distortion =
+        k1 < 0 ? Distortion{k1, 0.05F, 0.01F, -0.02F, 0.01F} : fisheye(k1, 0.05F, 0.01F, -0.02F);
+  }
   // With noise of triangles images jump at the horizon of a face's plane (kernels/README.md).
   trial.scene.perspective_correct = draw.chance(trial.has("noise of triangles") ? 0.25F : 0.8F);
   if (!trial.scene.perspective_correct) trial.features.insert("affine");
@@ -288,7 +292,13 @@ inline std::vector<Parameters> parameters_of(const Trial& trial, SceneGradient& 
     else
       add("field of view", {of.fov_y_degrees}, {60 / size},
           [=](Trial& t, std::size_t, double by) { camera(t).fov_y_degrees += static_cast<float>(by); });
-    if (own.distortion)
+    if (own.distortion && own.distortion->model == LensModel::fisheye)
+      add("distortion", {of.fisheye.begin(), of.fisheye.end()},
+          {20 / size, 100 / size, 500 / size, 2500 / size}, [=](Trial& t, std::size_t i, double by) {
+            Distortion& d = *camera(t).distortion;
+            (i == 0 ? d.k1 : i == 1 ? d.k2 : i == 2 ? d.k3 : d.k4) += static_cast<float>(by);
+          });
+    else if (own.distortion)
       add("distortion", {of.distortion.begin(), of.distortion.end()},
           {20 / size, 100 / size, 8 / size, 8 / size, 500 / size}, [=](Trial& t, std::size_t i, double by) {
             Distortion& d = *camera(t).distortion;

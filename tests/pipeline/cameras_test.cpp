@@ -82,6 +82,15 @@ Formula opengl_formula(const glm::mat4& view, const glm::mat4& projection) {
   };
 }
 
+/// Pixels between where a camera shows OpenCV's points and where OpenCV does, which counts from pixels' centres.
+double largest_error(const Camera& camera, const OpencvCase& opencv) {
+  const std::vector<glm::dvec2> found = pixels_of(camera, opencv.points);
+  double worst = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    worst = std::max(worst, glm::length(found[i] - (opencv.pixels[i] + 0.5)));
+  return worst;
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
@@ -116,13 +125,7 @@ TEST_SUITE("pipeline") {
 
   TEST_CASE("cameras: OpenCV's projectPoints, with all five coefficients") {
     for (const OpencvCase& opencv : test::opencv_cases("lenses")) {
-      const auto largest = [&](const Camera& camera) {
-        const std::vector<glm::dvec2> found = pixels_of(camera, opencv.points);
-        double worst = 0;
-        for (std::size_t i = 0; i < found.size(); ++i)
-          worst = std::max(worst, glm::length(found[i] - (opencv.pixels[i] + 0.5)));  // half a pixel
-        return worst;
-      };
+      const auto largest = [&](const Camera& camera) { return largest_error(camera, opencv); };
       CHECK(largest(opencv.camera) < k_tolerance);
       // Coefficients in another order, or with another axis, are noticed.
       const Distortion d = *opencv.camera.distortion;
@@ -135,6 +138,23 @@ TEST_SUITE("pipeline") {
       wrong.distortion = Distortion{d.k1, d.k3, d.p1, d.p2, d.k2};
       CHECK(largest(wrong) > 1e-3);
       CHECK(to_opencv_intrinsics(*opencv.camera.intrinsics).cx == opencv.camera.intrinsics->cx - 0.5F);
+    }
+  }
+
+  TEST_CASE("cameras: OpenCV's fisheye::projectPoints, with all four coefficients") {
+    for (const OpencvCase& opencv : test::opencv_cases("fisheyes")) {
+      CHECK(largest_error(opencv.camera, opencv) < k_tolerance);
+      const Distortion d = *opencv.camera.distortion;
+      Camera wrong = opencv.camera;
+      wrong.distortion->model = LensModel::brown;
+      wrong.distortion->k4 = 0;
+      CHECK(largest_error(wrong, opencv) > 10);
+      for (const Distortion& other :
+           {fisheye(d.k1 + 0.01F, d.k2, d.k3, d.k4), fisheye(d.k1, d.k2 + 0.01F, d.k3, d.k4),
+            fisheye(d.k1, d.k2, d.k3 + 0.01F, d.k4), fisheye(d.k1, d.k2, d.k3, d.k4 + 0.01F)}) {
+        wrong.distortion = other;
+        CHECK(largest_error(wrong, opencv) > 0.3);
+      }
     }
   }
 
@@ -202,6 +222,13 @@ TEST_SUITE("pipeline") {
     for (std::size_t i = 0; i < grad.pixels.size(); ++i) grad.pixels[i] = glm::vec4(float(i % 7), 0, 0, 0);
     const SceneGradient found = renderer.backward(std::span(&grad, 1));
     for (const double k : found.views[0].camera.distortion) CHECK(k != 0);
+    scene.camera.distortion = fisheye(0, 0, 0, 0);
+    renderer.set_scene(scene);
+    renderer.forward();
+    CHECK(renderer.image().pixels != plain.pixels);
+    const SceneGradient of_fisheye = renderer.backward(std::span(&grad, 1));
+    for (const double k : of_fisheye.views[0].camera.fisheye) CHECK(k != 0);
+    for (const double k : of_fisheye.views[0].camera.distortion) CHECK(k == 0);
   }
 }
 
@@ -220,7 +247,9 @@ TEST_SUITE("robustness") {
     CHECK_NOTHROW(renderer.set_views(orthographic));
     other = own;
     other.camera.distortion = Distortion{-0.2F};
-    const View lenses[] = {own, other};
+    View fish = own;
+    fish.camera.distortion = fisheye(-0.2F, 0, 0, 0);
+    const View lenses[] = {own, other, fish};
     renderer.set_views(std::span(&own, 1));
     renderer.forward();
     const Image alone = renderer.image();
@@ -228,6 +257,7 @@ TEST_SUITE("robustness") {
     renderer.forward();
     CHECK(renderer.image(0).pixels == alone.pixels);
     CHECK(renderer.image(1).pixels != alone.pixels);
+    CHECK(renderer.image(2).pixels != renderer.image(1).pixels);
   }
 }
 

@@ -51,8 +51,8 @@ Scene pixel_noise(Scene scene, float sigma = 2e-3F) {
   return scene;
 }
 
-/// A solid cut open under a random lens and random intrinsics.
-Scene random_lens_scene(unsigned seed) {
+/// A solid cut open under a random lens of that model and random intrinsics.
+Scene random_lens_scene(unsigned seed, LensModel model) {
   Random random(seed);
   Scene scene = scene_cut_open(seed % 2 == 0 ? welded_cube() : make_icosphere(1, 1.4F), reduced(32, 12),
                                reduced(26, 10));
@@ -63,6 +63,8 @@ Scene random_lens_scene(unsigned seed) {
                              random(0.45F, 0.55F) * side};
   scene.camera.distortion = {random(-0.2F, 0.2F), random(-0.05F, 0.05F), random(-0.02F, 0.02F),
                              random(-0.02F, 0.02F), random(-0.01F, 0.01F)};
+  const Distortion& d = *scene.camera.distortion;
+  if (model == LensModel::fisheye) scene.camera.distortion = fisheye(d.k1, d.k2, d.p1, d.p2);
   scene.gradients.distortion = true;
   return scene;
 }
@@ -248,15 +250,20 @@ TEST_SUITE("pipeline") {
         [](Camera& c) { return &c.distortion->k1; }, [](Camera& c) { return &c.distortion->k2; },
         [](Camera& c) { return &c.distortion->p1; }, [](Camera& c) { return &c.distortion->p2; },
         [](Camera& c) { return &c.distortion->k3; }};
+    const std::vector<Number> fisheye_lens{lens[0], lens[1], lens[4],
+                                           [](Camera& c) { return &c.distortion->k4; }};
     const Device device = open_device();
-    for (const bool of_pixel : {false, true}) {
+    for (const auto& [model, of_pixel] :
+         {std::pair{LensModel::brown, false}, {LensModel::brown, true}, {LensModel::fisheye, false}}) {
+      const auto& numbers = model == LensModel::fisheye ? fisheye_lens : lens;
+      CAPTURE(static_cast<int>(model));
       CAPTURE(of_pixel);
       if (of_pixel && dpr::test::is_reduced()) continue;  // ten pixels are too few for its gradients
       // Longer ones see jumps of faces seen edge-on; noise of the pixel has kinks where samples change faces.
       const float step = of_pixel ? 1e-3F : 1e-4F;
       std::vector<double> of_intrinsics, of_lens;
       for (unsigned seed = 0; seed < static_cast<unsigned>(reduced(10, 2)); ++seed) {
-        Scene scene = random_lens_scene(seed);
+        Scene scene = random_lens_scene(seed, model);
         if (of_pixel) {
           scene = pixel_noise(scene, 2e-2F);
           scene.smoothing.supersampling = 4;
@@ -270,8 +277,11 @@ TEST_SUITE("pipeline") {
         of_intrinsics.push_back(
             relative_error({found.intrinsics.begin(), found.intrinsics.end()},
                            difference_of(renderer, scene, weights, intrinsics, 20 * step)));
-        of_lens.push_back(relative_error({found.distortion.begin(), found.distortion.end()},
-                                         difference_of(renderer, scene, weights, lens, step)));
+        const std::vector<double> found_lens =
+            model == LensModel::fisheye
+                ? std::vector<double>(found.fisheye.begin(), found.fisheye.end())
+                : std::vector<double>(found.distortion.begin(), found.distortion.end());
+        of_lens.push_back(relative_error(found_lens, difference_of(renderer, scene, weights, numbers, step)));
       }
       MESSAGE("median errors: intrinsics " << median(of_intrinsics) << ", distortion " << median(of_lens));
       const double tolerance = of_pixel ? 3e-2 : 6e-3;

@@ -188,6 +188,8 @@ TEST_SUITE("pipeline") {
     sphere.camera.distortion = pincushion;
     sphere.lights = two_lights(Shading::phong);
     sphere.gradients.lights = true;
+    Scene& near = add("fisheye, lights", sphere);
+    near.camera.distortion = fisheye(0.12F, -0.07F, 0.03F, -0.01F);
     Scene& orthographic = add("orthographic, joint", cube_scene(width, height));
     orthographic.camera.orthographic_height = 4.3F;
     orthographic.smoothing.composition = Composition::joint;
@@ -216,7 +218,9 @@ TEST_SUITE("pipeline") {
     Scene cut = scene_cut_open(make_cube(), size, size);
     cut.camera.distortion = Distortion{-0.2F, 0.05F, 0.01F, -0.02F, 0.0F};
     cut.gradients.distortion = true;
-    check_scenes({{"barrel, near plane", cut}});
+    Scene fish = cut;
+    fish.camera.distortion = fisheye(0.1F, -0.05F, 0.02F, -0.01F);
+    check_scenes({{"barrel, near plane", cut}, {"fisheye, near plane", fish}});
   }
 
   TEST_CASE("reference: lights, metrics, interpolation, coloured faces, the preset gaussian") {

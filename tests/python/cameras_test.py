@@ -116,6 +116,22 @@ class CamerasTest(unittest.TestCase):
                             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
                 # Whole numbers are OpenCV's pixels' centres.
                 self.assert_at([K[0, 0] * x + K[0, 2] + 0.5, K[1, 1] * y + K[1, 2] + 0.5], point, views, intrinsics)
+        # Beside cv2.fisheye's own D, a column, and a batch.
+        D = np.array([0.2, -0.1, 0.05, -0.02])
+        for fisheye in (D, D[:, None], D[None]):
+            views, intrinsics = cameras.from_opencv(R, t, K, fisheye=fisheye)
+            self.assertEqual(intrinsics.shape, (1, 8))
+        for point in POINTS:
+            x, y, z = R @ point + t
+            r = np.hypot(x, y) / z
+            angle = np.arctan(r)
+            factor = (angle + D @ angle ** np.array([3, 5, 7, 9])) / r / z
+            self.assert_at([K[0, 0] * factor * x + K[0, 2] + 0.5, K[1, 1] * factor * y + K[1, 2] + 0.5], point, views,
+                           intrinsics)
+        with self.assertRaisesRegex(ValueError, "one of them"):
+            cameras.from_opencv(R, t, K, D, fisheye=D)
+        with self.assertRaisesRegex(ValueError, "fisheye.* 4 coefficients"):
+            cameras.from_opencv(R, t, K, fisheye=np.zeros(5))
         four = cameras.from_opencv(R, t, K, [[0.1, 0.2, 0.3, 0.4]])[1]
         np.testing.assert_allclose(four[0, 4:], [0.1, 0.2, 0.3, 0.4, 0], rtol=1e-6)
         with self.assertRaisesRegex(ValueError, "skew"):

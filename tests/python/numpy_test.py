@@ -79,6 +79,20 @@ class NumpyTest(unittest.TestCase):
                           ("materials", "specular"), ("materials", "shininess")):
             self.check_gradient(f"{name}.{key}", of_entry(name, key), name, arguments)
 
+    def test_gradients_through_a_fisheye(self):
+        views, intrinsics = cameras(2)
+        rows = np.concatenate([intrinsics, np.tile(np.float32([0.3, -0.2, 0.1, -0.05]), (2, 1))], 1)
+        arguments = {"vertices": 3 * SQUARE, "faces": SQUARE_FACES, "views": views, "intrinsics": rows}
+        self.assertGreater(np.abs(dpr.render(**arguments, width=SIZE, height=SIZE)
+                                  - dpr.render(**{**arguments, "intrinsics": intrinsics}, width=SIZE, height=SIZE)).max(),
+                           0.1)
+        directions = {"vertices": random(*SQUARE.shape, seed=7) - 0.5,
+                      "intrinsics": np.float32([[0] * 4 + [1, 1, 2, 3]] * 2)}
+        for name, direction in directions.items():
+            self.check_gradient(name, lambda given, step, name=name, direction=direction: (
+                {**given, name: given[name] + np.float32(step) * direction}, lambda g: (g * direction).sum()), name,
+                arguments)
+
     def test_gradients_have_the_arguments_form(self):
         views, intrinsics = cameras(2)
         arguments = textured()
@@ -165,6 +179,8 @@ class NumpyTest(unittest.TestCase):
         cut = dpr.subdivide(wall, np.array([[0, 1, 2], [0, 2, 3]]), cameras(1)[0], lens, width=80, height=60,
                             texcoords=wall[:, :2])
         self.assertGreater(len(cut.faces), 20)
+        fisheye = dpr.subdivide(wall, np.array([[0, 1, 2], [0, 2, 3]]), cameras(1)[0], lens[:, :8], width=80, height=60)
+        self.assertGreater(len(fisheye.faces), 20)
         np.testing.assert_allclose(cut.texcoords, cut.of_vertices(wall)[cut.faces][..., :2], atol=1e-6)
 
     def test_threads_and_pickles(self):

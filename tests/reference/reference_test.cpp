@@ -155,7 +155,9 @@ TEST_SUITE("gradient") {
     const Vec3d position = random.vector(-0.7, 0.7);
     const Vec3d grad_ndc = random.vector(-1.0, 1.0);
     const ImageSize size{64, 48};
-    for (const bool is_orthographic : {false, true}) {
+    enum class Lens { brown, fisheye, orthographic };
+    for (const Lens lens : {Lens::brown, Lens::fisheye, Lens::orthographic}) {
+      const bool is_orthographic = lens == Lens::orthographic;
       // view rotation and translation, height, intrinsics, coefficients
       const auto camera_at = [&](const std::vector<double>& v) {
         Camera c;
@@ -164,7 +166,8 @@ TEST_SUITE("gradient") {
           c.orthographic_height = 2.3 + v[6];
         } else {
           c.intrinsics = Intrinsics{40.0 + v[7], 45.0 + v[8], 20.0 + v[9], 26.0 + v[10]};
-          c.distortion = Distortion{-0.31 + v[11], 0.12 + v[12], 0.02 + v[13], -0.03 + v[14], 0.05 + v[15]};
+          c.distortion = Distortion{{-0.31 + v[11], 0.12 + v[12], 0.02 + v[13], -0.03 + v[14], 0.05 + v[15]},
+                                    lens == Lens::fisheye};
         }
         return c;
       };

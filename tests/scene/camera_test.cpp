@@ -93,6 +93,16 @@ TEST_SUITE("unit") {
     CHECK(largest_radius({0, 0, 0, 0, -1.0F / 7}) == doctest::Approx(1));
   }
 
+  TEST_CASE("the radius where the image of a fisheye folds over") {
+    // 1 + 3 k1 a^2 = 0, and the same in a^8
+    CHECK(largest_radius(fisheye(-0.3F, 0, 0, 0)) == doctest::Approx(std::tan(std::sqrt(1 / 0.9))));
+    CHECK(largest_radius(fisheye(0, 0, 0, -1.0F / 9)) == doctest::Approx(std::tan(1.0)));
+    // (1 - s) (1 - s / 4), s = a^2
+    CHECK(largest_radius(fisheye(-1.25F / 3, 0.25F / 5, 0, 0)) == doctest::Approx(std::tan(1.0)));
+    CHECK(std::isinf(largest_radius(fisheye(0, 0, 0, 0))));
+    CHECK(std::isinf(largest_radius(fisheye(-0.13F, 0, 0, 0))));  // beyond 90 degrees
+  }
+
   TEST_CASE("orbit") {
     CHECK(is_close(orbit_camera(6.7F, 0, 0).view, rows({1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, -6.7F})));
     // Azimuth 90: the camera stands on +x and looks down -x; the world's -z is on its right.
@@ -160,6 +170,16 @@ TEST_SUITE("robustness") {
     camera.orthographic_height.reset();
     camera.distortion = Distortion{0, 0, k_nan};
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "p1 (camera.distortion): got nan");
+    camera.distortion = Distortion{.k4 = 1};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera),
+                          "k4 (camera.distortion): got 1, expected 0 of Brown's model");
+    camera.distortion = fisheye(0, 0, 0, k_nan);
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera), "k4 (camera.fisheye): got nan");
+    camera.distortion = Distortion{.p2 = 1, .model = LensModel::fisheye};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(camera),
+                          "p2 (camera.fisheye): got 1, expected 0 of a fisheye");
+    camera.distortion = fisheye(1, 2, 3, 4);
+    CHECK_NOTHROW(validate(camera));
     glm::mat4 projection(1.0F);
     projection[2][3] = 0.5F;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, from_opengl(k_view, projection, 8, 8), "projection (from_opengl)");

@@ -150,6 +150,8 @@ TEST_SUITE("unit") {
     CHECK(scene.camera.distortion->k3 == 5);
     CHECK(scene.gradients.distortion);
     CHECK_FALSE(scene.gradients.camera);
+    scene = read(folder, with(R"("camera": {"fisheye": [1, 2, 3, 4]})"));
+    CHECK(scene.camera.distortion == fisheye(1, 2, 3, 4));
     scene = read(folder, with(R"("camera": {"projection": "orthographic", "orthographic_height": 3})"));
     CHECK(scene.camera.orthographic_height == 3);
     CHECK_FALSE(scene.camera.distortion);
@@ -375,6 +377,12 @@ TEST_SUITE("robustness") {
     check(with(R"("camera": {"projection": "orthographic", "orthographic_height": 1, "fov_y_degrees": 9})"),
           "got fov_y_degrees and an orthographic projection");
     check(with(R"("camera": {"distortion": [0, 0]})"), "camera.distortion (");
+    check(with(R"("camera": {"fisheye": [0, 0, 0, 0, 0]})"), "camera.fisheye (");
+    check(with(R"("camera": {"fisheye": [0, 0, 0, 0], "distortion": [0, 0, 0, 0, 0]})"),
+          "got distortion and fisheye, expected one of the two");
+    check(with(R"("camera": {"projection": "orthographic", "orthographic_height": 1,
+                             "fisheye": [0, 0, 0, 0]})"),
+          "got fisheye and an orthographic projection");
   }
 
   TEST_CASE("scenes that cannot be rendered") {

@@ -51,10 +51,16 @@ Mesh room() {
 glm::dvec2 opencv_pixel(const Camera& camera, glm::dvec2 t) {
   const Distortion& d = *camera.distortion;
   const double x = t.x, y = -t.y, r2 = x * x + y * y;
+  const Intrinsics& k = *camera.intrinsics;
+  if (d.model == LensModel::fisheye) {
+    const double r = std::sqrt(r2), a = std::atan(r), a2 = a * a;
+    const double shown = a * (1 + a2 * (d.k1 + a2 * (d.k2 + a2 * (d.k3 + a2 * double{d.k4}))));
+    const double factor = r > 0 ? shown / r : 1;
+    return {k.fx * factor * x + k.cx, k.fy * factor * y + k.cy};
+  }
   const double radial = 1 + r2 * (d.k1 + r2 * (d.k2 + r2 * double{d.k3}));
   const double shown_x = x * radial + 2 * d.p1 * x * y + d.p2 * (r2 + 2 * x * x);
   const double shown_y = y * radial + d.p1 * (r2 + 2 * y * y) + 2 * d.p2 * x * y;
-  const Intrinsics& k = *camera.intrinsics;
   return {k.fx * shown_x + k.cx, k.fy * shown_y + k.cy};
 }
 
@@ -196,7 +202,7 @@ bool is_same(const Mesh& a, const Mesh& b) {
 TEST_SUITE("unit") {
   TEST_CASE("subdivision for a lens: what is drawn of walls and rooms is where the lens shows it") {
     const Distortion barrel{-0.22F, 0.03F, 0.01F, -0.006F, 0.001F}, cushion{0.3F, 0.05F, 0, 0.01F, 0};
-    for (const Distortion& lens : {barrel, cushion}) {
+    for (const Distortion& lens : {barrel, cushion, fisheye(0.06F, -0.03F, 0.015F, -0.005F)}) {
       for (const Mesh& mesh : {wall(), room()}) {
         const Scene scene = lens_scene(mesh, lens);
         const SubdividedScene cut = subdivide_for_lens(scene);
@@ -210,6 +216,15 @@ TEST_SUITE("unit") {
         CHECK(coarser.meshes[0].mesh.faces.size() < cut.scene.meshes[0].mesh.faces.size());
       }
     }
+  }
+
+  TEST_CASE("subdivision for a lens: a room seen by a fisheye that shows 180 degrees") {
+    Scene scene = lens_scene(room(), fisheye(0, 0, 0, 0));
+    scene.camera.intrinsics = Intrinsics{38, 38, 80, 60};  // 60 pixels for a right angle
+    const Scene cut = subdivide_for_lens(scene).scene;
+    CHECK(worst_drawn(cut).edge < 1.02 * double{k_tolerance});
+    CHECK(worst_drawn(cut).inside < 1.4 * double{k_tolerance});
+    CHECK(cut.meshes[0].mesh.faces.size() < 12000);
   }
 
   TEST_CASE("subdivision for a lens: no crack opens, at seams neither") {
@@ -323,6 +338,8 @@ TEST_SUITE("unit") {
       scene.camera.distortion = Distortion{k1, -1e6F, 100, -100, 1e20F};  // nothing that a lens does
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide_for_lens(scene, {.most_new_faces = 100000}),
                             "a larger one, or more new faces allowed");
+      scene.camera.distortion = fisheye(0.1F * k1, 0, 0, 0);
+      CHECK(subdivide_for_lens(scene).meshes[0].face_of.size() < 200000);
     }
     Mesh odd = wall();  // faces between equal corners
     odd.faces.insert(odd.faces.end(), {{0, 0, 2}, {1, 1, 1}});

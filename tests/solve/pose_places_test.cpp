@@ -97,6 +97,22 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("from its place in a box an object is seen there by a fisheye") {
+    Scene scene = cube_scene();
+    scene.camera.intrinsics = Intrinsics{30, 32, 52, 37};
+    scene.camera.distortion = fisheye(0.05F, -0.02F, 0.01F, 0);
+    for (const glm::dvec2& at : {glm::dvec2(52, 37), {40, 30}, {16, 50}}) {
+      const auto x = static_cast<float>(at.x), y = static_cast<float>(at.y);
+      const BoxPlaces places(scene, PoseBody(scene, {}), {x - 1, y - 1, 2, 2});
+      const glm::dvec3 p(glm::dmat4(scene.camera.view) * glm::dvec4(places.translation(glm::dmat3(1)), 1));
+      const double r = std::hypot(p.x, p.y) / -p.z, angle = std::atan(r);
+      const double shown =
+          angle + 0.05 * std::pow(angle, 3) - 0.02 * std::pow(angle, 5) + 0.01 * std::pow(angle, 7);
+      const double factor = r > 0 ? shown / r / -p.z : 1;
+      CHECK(glm::distance(glm::dvec2(52 + 30 * factor * p.x, 37 - 32 * factor * p.y), at) < 0.1);
+    }
+  }
+
   TEST_CASE("a problem cut to a box shows the same in fewer pixels") {
     if (test::is_reduced()) return;
     const Device device = open_device();

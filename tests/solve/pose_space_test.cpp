@@ -67,8 +67,10 @@ TEST_SUITE("solve") {
     calibrated.distortion = Distortion{-0.1F, 0.02F, 0.01F, -0.01F, 0};
     orthographic.orthographic_height = 5.0F;
     const double tolerance = test::is_reduced() ? 5e-2 : 2e-2;  // of fewer pixels more lie on kinks
+    Camera wide = calibrated;
+    wide.distortion = fisheye(0.1F, -0.02F, 0.01F, 0);
     std::vector<Camera> cameras{calibrated};
-    if (!test::is_reduced()) cameras.insert(cameras.end(), {pinhole, orthographic});
+    if (!test::is_reduced()) cameras.insert(cameras.end(), {pinhole, orthographic, wide});
     for (const Camera& camera : cameras) {
       scene.camera = camera;
       options.solve_distortion = !camera.orthographic_height;

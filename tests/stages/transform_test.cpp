@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <utility>
 
+#include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
 #include "reference/transform.hpp"
 #include "renderer/renderer_impl.hpp"
@@ -45,8 +46,7 @@ ref::Projection to_reference(const dpr::Projection& p, const dpr::Camera& camera
                              {number(p.offset.x), number(p.offset.y)},
                              camera.orthographic_height.has_value(),
                              {}};
-  if (const auto& d = camera.distortion)
-    projection.distortion = {number(d->k1), number(d->k2), number(d->p1), number(d->p2), number(d->k3)};
+  if (camera.distortion) projection.distortion = dpr::check::to_reference(*camera.distortion);
   return projection;
 }
 
@@ -56,7 +56,7 @@ glm::mat4 random_pose(RandomFloat& random) {
   return glm::scale(turned, glm::vec3(random(0.5F, 1.5F), random(0.5F, 1.5F), random(0.5F, 1.5F)));
 }
 
-enum class Lens { perfect, distorting, orthographic };
+enum class Lens { perfect, distorting, fisheye, orthographic };
 
 /// Two meshes in three views: one camera with intrinsics off the centre. Two of the lenses may distort.
 class TwoMeshes {
@@ -76,6 +76,7 @@ class TwoMeshes {
       }
       if (lens == Lens::distorting && v > 0)
         view.camera.distortion = dpr::Distortion{-0.31F, 0.12F, 0.02F, -0.03F, 0.05F};
+      if (lens == Lens::fisheye && v > 0) view.camera.distortion = dpr::fisheye(0.21F, -0.08F, 0.05F, -0.02F);
       for (int m = 0; m < 2; ++m) {
         glm::mat4 pose = random_pose(random);
         pose[3] = glm::vec4(random(-1, 1), random(-1, 1), random(-1, 1), 1);
@@ -166,7 +167,8 @@ TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
   dpr::Buffer<cl_float4> grad(impl_of(m.device), std::span<const cl_float4>(grad_ndc));
   const dpr::Buffer<cl_float4> clip_buffer(impl_of(m.device), std::span<const cl_float4>(grad_clip));
   const dpr::Buffer<cl_float4> world_buffer(impl_of(m.device), std::span<const cl_float4>(grad_world));
-  const std::size_t channel_count = lens == Lens::distorting ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
+  const bool distorts = lens == Lens::distorting || lens == Lens::fisheye;
+  const std::size_t channel_count = distorts ? DPR_LENS_CHANNELS : DPR_POSE_CHANNELS;
   const std::size_t segments = 2 * t.views.size(), slots = dpr::slots_of_segments(vertices / 2);
   poison(m.transform.partial_sums, channel_count * segments * 2 * slots);
   poison(m.transform.grad_positions, vertices, cl_float4{{NAN, NAN, NAN, NAN}});
@@ -211,11 +213,38 @@ TransformErrors backward_errors(Lens lens, bool lit, bool clips, double flip) {
   return errors;
 }
 
+/// Points on a line through the axis, some beyond the radius where the image would fold over.
+void check_held(const dpr::Distortion& lens) {
+  dpr::Scene scene;
+  scene.width = scene.height = 8;
+  scene.camera.distortion = lens;
+  const double radius = dpr::largest_radius(*scene.camera.distortion);
+  const auto along = [&](double r) { return glm::vec3(0.6 * r, 0.8 * r, -1.0) * 2.0F; };
+  dpr::Mesh mesh;
+  mesh.positions = {along(radius), along(1.001 * radius), along(40 * radius), along(0.95 * radius)};
+  mesh.faces = {{0, 1, 2}, {1, 2, 3}};
+  scene.meshes = {{mesh, glm::mat4(1.0F)}};
+  dpr::Renderer renderer(dpr::test::test_device());
+  renderer.set_scene(scene);
+  dpr::Renderer::Impl& m = impl_of(renderer);
+  m.transform.forward(m.frame, m.device_views, *m.geometry, false);
+  const std::vector<cl_float4> ndc = m.transform.ndc.download();
+  const ref::Projection p = to_reference(dpr::projection(scene.camera, 8, 8), scene.camera);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const ref::Vec3d wanted = ref::transform_forward(to_reference(along(i < 3 ? radius : 0.95 * radius)),
+                                                     ref::k_identity, ref::k_identity, p)
+                                  .ndc;
+    CHECK(number(ndc[i].s[0]) == doctest::Approx(wanted.x).epsilon(1e-6));
+    CHECK(number(ndc[i].s[1]) == doctest::Approx(wanted.y).epsilon(1e-6));
+  }
+  CHECK(ndc[3].s[0] < ndc[0].s[0] - 1e-4F);
+}
+
 }  // namespace
 
 TEST_SUITE("unit") {
   TEST_CASE("transform: world, NDC and depth are the reference's") {
-    for (const Lens lens : {Lens::perfect, Lens::distorting, Lens::orthographic}) {
+    for (const Lens lens : {Lens::perfect, Lens::distorting, Lens::fisheye, Lens::orthographic}) {
       TwoMeshes t(lens);
       dpr::Renderer::Impl& m = t.impl();
       const std::size_t vertices = t.positions.size(), count = vertices * t.views.size();
@@ -241,29 +270,8 @@ TEST_SUITE("unit") {
   }
 
   TEST_CASE("transform: beyond the radius where the image would fold over points are held at it") {
-    dpr::Scene scene;
-    scene.width = scene.height = 8;
-    scene.camera.distortion = dpr::Distortion{-0.3F};
-    const double radius = dpr::largest_radius(*scene.camera.distortion);
-    const auto along = [&](double r) { return glm::vec3(0.6 * r, 0.8 * r, -1.0) * 2.0F; };
-    dpr::Mesh mesh;
-    mesh.positions = {along(radius), along(1.001 * radius), along(40 * radius), along(0.95 * radius)};
-    mesh.faces = {{0, 1, 2}, {1, 2, 3}};
-    scene.meshes = {{mesh, glm::mat4(1.0F)}};
-    dpr::Renderer renderer(dpr::test::test_device());
-    renderer.set_scene(scene);
-    dpr::Renderer::Impl& m = impl_of(renderer);
-    m.transform.forward(m.frame, m.device_views, *m.geometry, false);
-    const std::vector<cl_float4> ndc = m.transform.ndc.download();
-    const ref::Projection p = to_reference(dpr::projection(scene.camera, 8, 8), scene.camera);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const ref::Vec3d wanted = ref::transform_forward(to_reference(along(i < 3 ? radius : 0.95 * radius)),
-                                                       ref::k_identity, ref::k_identity, p)
-                                    .ndc;
-      CHECK(number(ndc[i].s[0]) == doctest::Approx(wanted.x).epsilon(1e-6));
-      CHECK(number(ndc[i].s[1]) == doctest::Approx(wanted.y).epsilon(1e-6));
-    }
-    CHECK(ndc[3].s[0] < ndc[0].s[0] - 1e-4F);
+    for (const dpr::Distortion& lens : {dpr::Distortion{-0.3F}, dpr::fisheye(-0.3F, 0, 0, 0)})
+      check_held(lens);
   }
 }
 
@@ -272,6 +280,7 @@ TEST_SUITE("gradient") {
     for (const auto& [lens, lit] : {std::pair{Lens::perfect, true},
                                     {Lens::perfect, false},
                                     {Lens::distorting, true},
+                                    {Lens::fisheye, true},
                                     {Lens::orthographic, true}}) {
       for (const bool clips : {false, true}) {
         CAPTURE(static_cast<int>(lens));
@@ -283,12 +292,15 @@ TEST_SUITE("gradient") {
         DPR_CHECK_WORST(errors.model, tolerance);
         DPR_CHECK_WORST(errors.camera, tolerance);
         DPR_CHECK_WORST(errors.projection, tolerance);
-        if (lens == Lens::distorting) DPR_CHECK_WORST(errors.distortion, k_distortion);
+        if (lens == Lens::distorting || lens == Lens::fisheye)
+          DPR_CHECK_WORST(errors.distortion, k_distortion);
       }
     }
-    const TransformErrors flipped = backward_errors(Lens::distorting, true, false, -1);
-    CHECK(flipped.camera.error > k_gradient);
-    CHECK(flipped.distortion.error > k_distortion);
+    for (const Lens lens : {Lens::distorting, Lens::fisheye}) {
+      const TransformErrors flipped = backward_errors(lens, true, false, -1);
+      CHECK(flipped.camera.error > k_gradient);
+      CHECK(flipped.distortion.error > k_distortion);
+    }
   }
 
   TEST_CASE(

@@ -308,7 +308,7 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
         if count == 0:
             fail(ValueError, "views", [0, 4, 4], "at least one view")
         if len(intrinsics.shape) != 2 or intrinsics.shape[0] != count:
-            fail(ValueError, "intrinsics", list(intrinsics.shape), " or ".join(f"[{count}, {n}]" for n in (4, 9, 1)))
+            fail(ValueError, "intrinsics", list(intrinsics.shape), " or ".join(f"[{count}, {n}]" for n in (4, 9, 8, 1)))
         meshes = len(mesh["faces"]) if isinstance(mesh["faces"], (list, tuple)) else 0
         for i in range(count):
             own = {name: values[i] for name, values in lists.items()}

@@ -109,8 +109,8 @@ class Renderer:
                      dpr.look_at(), dpr.perspective() and dpr.cameras make views and intrinsics. One of either, and one
                      mesh, go with N of the others
         intrinsics   [N, 4], fx, fy, cx, cy in pixels from the corner of the top-left pixel (OpenCV's cx and cy plus
-                     0.5); [N, 9], the same and OpenCV's k1, k2, p1, p2, k3; [N, 1], orthographic: world units from
-                     the lower to the upper edge
+                     0.5); [N, 9], the same and OpenCV's k1, k2, p1, p2, k3; [N, 8], the same and its fisheye's k1 to
+                     k4; [N, 1], orthographic: world units from the lower to the upper edge
         colors       [V, 3] or [N, V, 3], linear RGB of the vertices; or
         face_colors  [F, 3] or [N, F, 3], of the faces; white without either
         texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with

@@ -145,15 +145,20 @@ def _require_projection(matrix, is_orthographic, width, height):
         _fail("projection", matrix[0].tolist(), "an orthographic one on the image's centre, with square pixels")
 
 
-def from_opencv(rotation: Array, translation: Array, matrix: Array,
-                distortion: Optional[Array] = None) -> Tuple[Array, Array]:
+def from_opencv(rotation: Array, translation: Array, matrix: Array, distortion: Optional[Array] = None, *,
+                fisheye: Optional[Array] = None) -> Tuple[Array, Array]:
     """(views, intrinsics) of OpenCV's cameras: x_camera = rotation x + translation with y down and z forward, [3, 3] or
-    [N, 3, 3] and [3] or [N, 3]; the camera matrix [3, 3] or [N, 3, 3], which counts from a pixel's centre; 4 or 5
-    coefficients of a lens, k1, k2, p1, p2, k3, also [N, 4] or [N, 5]. Raises ValueError for a skewed camera matrix."""
-    if distortion is None:
+    [N, 3, 3] and [3] or [N, 3]; the camera matrix [3, 3] or [N, 3, 3], which counts from a pixel's centre.
+
+    distortion: 4 or 5 coefficients of a lens, k1, k2, p1, p2, k3, also [N, 4] or [N, 5]; or fisheye: the 4 coefficients D
+    of cv2.fisheye, also [N, 4]. Raises ValueError for both of them, and for a skewed camera matrix."""
+    if distortion is not None and fisheye is not None:
+        _fail("fisheye", "distortion and fisheye", "one of them")
+    name, lens, counts = ("distortion", distortion, (4, 5)) if fisheye is None else ("fisheye", fisheye, (4,))
+    if lens is None:
         lib, (rotation, translation, matrix) = _together(rotation, translation, matrix)
     else:
-        lib, (rotation, translation, matrix, distortion) = _together(rotation, translation, matrix, distortion)
+        lib, (rotation, translation, matrix, lens) = _together(rotation, translation, matrix, lens)
     rotation, matrix = _batch("rotation", rotation, 3, 3), _batch("matrix", matrix, 3, 3)
     if translation.ndim > 1 and translation.shape[-1] == 1:  # a column, as OpenCV has it
         translation = translation[..., 0]
@@ -163,12 +168,14 @@ def from_opencv(rotation: Array, translation: Array, matrix: Array,
     signs = _together(rotation, [1, -1, -1])[1][1]
     views = _affine(lib, signs[:, None] * rotation, signs * translation)
     columns = [matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 0, 2] + 0.5, matrix[:, 1, 2] + 0.5]
-    if distortion is not None:
-        count = distortion.shape[-1] if distortion.ndim else 0
-        if count not in (4, 5):
-            _fail("distortion", list(distortion.shape), "4 or 5 coefficients")
-        distortion = _batch("distortion", distortion, count)
-        columns += [distortion[:, i] for i in range(count)] + [0 * distortion[:, 0]] * (5 - count)
+    if lens is not None:
+        if fisheye is not None and tuple(lens.shape) == (4, 1):  # a column, as OpenCV has it
+            lens = lens[:, 0]
+        count = lens.shape[-1] if lens.ndim else 0
+        if count not in counts:
+            _fail(name, list(lens.shape), " or ".join(map(str, counts)) + " coefficients")
+        lens = _batch(name, lens, count)
+        columns += [lens[:, i] for i in range(count)] + [0 * lens[:, 0]] * (counts[-1] - count)
     return views, _columns(lib, *columns)
 
 

@@ -22,6 +22,33 @@ def project(matrix, distortion, rotation, translation, points):
     }
 
 
+def project_fisheye(matrix, coefficients, rotation, translation, points):
+    fx, fy, cx, cy = matrix
+    camera = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+    arrays = [np.array(values, float)[:, None] for values in (points, rotation, translation)]
+    pixels, _ = cv2.fisheye.projectPoints(*arrays, camera, np.array(coefficients))
+    return {
+        "camera_matrix": matrix,
+        "fisheye": coefficients,
+        "rotation_vector": rotation,
+        "translation": translation,
+        "points": points,
+        "pixels": [[round(float(u), 7), round(float(v), 7)] for u, v in pixels[:, 0]],
+    }
+
+
+def fisheyes():
+    """Points up to 88 degrees from the axis before cameras whose four coefficients all count; 200x150 pixels."""
+    points = [[x, y, z] for x in (-2.5, 0.125, 1.75) for y in (-1.5, 0.25, 2.0) for z in (-0.5, 0.75)]
+    return [
+        project_fisheye([60.5, 58.25, 101.0, 71.5], [0.0625, -0.03125, 0.015625, -0.0078125], [0.25, -0.125, 0.125],
+                        [0.125, -0.25, 1.375], points),
+        project_fisheye([64.0, 60.0, 92.0, 80.0], [-0.0625, 0.0078125, 0.00390625, -0.001953125], [-0.125, 0.25, -1.0],
+                        [-0.25, 0.0, 1.5], points),
+        project_fisheye([60.0, 60.0, 99.5, 74.5], [0.0] * 4, [0.0, 3.0, 0.25], [0.0, 0.125, 1.25], points),
+    ]
+
+
 def lenses():
     """Points before cameras whose five coefficients all count; 200x150 pixels."""
     steps = ((-0.75, 0.125, 0.875), (-0.625, 0.25, 0.75), (-0.5, 0.5))
@@ -57,4 +84,5 @@ def text(cases):
 if __name__ == "__main__":
     file = pathlib.Path(__file__).with_name("project_points.json")
     version = json.dumps(cv2.__version__)
-    file.write_text(f'{{"opencv": {version},\n"lenses": {text(lenses())},\n"boards": {text(boards())}}}\n')
+    file.write_text(f'{{"opencv": {version},\n"lenses": {text(lenses())},\n"boards": {text(boards())},\n'
+                    f'"fisheyes": {text(fisheyes())}}}\n')
