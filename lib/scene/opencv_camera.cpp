@@ -124,20 +124,21 @@ Intrinsics intrinsics_of(const YamlFile& yaml, const std::filesystem::path& file
   return intrinsics;
 }
 
-std::optional<Distortion> distortion_of(const YamlFile& yaml, const std::filesystem::path& file) {
-  constexpr const char* k_key = "distortion_coefficients";
+constexpr const char* k_coefficients = "distortion_coefficients";
+
+std::optional<Distortion> brown_lens(const YamlFile& yaml, const std::filesystem::path& file) {
   constexpr std::array<const char*, 14> k_names{"k1", "k2", "p1", "p2", "k3", "k4",    "k5",
                                                 "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y"};
   constexpr std::size_t k_held = 5;
-  const YamlValue* const value = yaml.find(k_key);
+  const YamlValue* const value = yaml.find(k_coefficients);
   if (value == nullptr) return {};
-  std::vector<float> k = yaml.matrix(*value, k_key);
+  std::vector<float> k = yaml.matrix(*value, k_coefficients);
   constexpr std::array<std::size_t, 6> k_counts{0, 4, 5, 8, 12, 14};
   if (std::ranges::find(k_counts, k.size()) == k_counts.end())
-    yaml.fail(*value, k_key, "4, 5, 8, 12 or 14 numbers, got " + std::to_string(k.size()));
+    yaml.fail(*value, k_coefficients, "4, 5, 8, 12 or 14 numbers, got " + std::to_string(k.size()));
   for (std::size_t i = k_held; i < k.size(); ++i) {
     if (k[i] == 0) continue;
-    throw InvalidArgument(checks::in(std::string(k_names[i]) + " of distortion_coefficients", file.string()),
+    throw InvalidArgument(checks::in(std::string(k_names[i]) + " of " + k_coefficients, file.string()),
                           checks::text(k[i]),
                           "0: a lens here has k1, k2, p1, p2 and k3; calibrate without the others");
   }
@@ -146,17 +147,24 @@ std::optional<Distortion> distortion_of(const YamlFile& yaml, const std::filesys
   return Distortion{k[0], k[1], k[2], k[3], k[4]};
 }
 
-void refuse_other_models(const YamlFile& yaml, const std::filesystem::path& file) {
-  if (yaml.whole_number("fisheye_model").value_or(0) != 0) {
-    throw InvalidArgument(checks::in("fisheye_model", file.string()), "a fish-eye",
-                          "a lens of cv::calibrateCamera, with k1, k2, p1, p2 and k3");
-  }
+Distortion fisheye_lens(const YamlFile& yaml, const std::filesystem::path& file) {
+  const YamlValue* const value = yaml.find(k_coefficients);
+  if (value == nullptr) throw IoError(file, std::string("a fisheye without ") + k_coefficients);
+  const std::vector<float> k = yaml.matrix(*value, k_coefficients);
+  if (k.size() != 4)
+    yaml.fail(*value, k_coefficients, "4 numbers of a fisheye, got " + std::to_string(k.size()));
+  return fisheye(k[0], k[1], k[2], k[3]);
+}
+
+bool is_fisheye(const YamlFile& yaml, const std::filesystem::path& file) {
+  if (yaml.whole_number("fisheye_model").value_or(0) != 0) return true;
   const YamlValue* const model = yaml.find("distortion_model");  // ROS
-  if (model == nullptr || model->lines.front() == "plumb_bob" ||
-      model->lines.front() == "rational_polynomial")
-    return;
-  throw InvalidArgument(checks::in("distortion_model", file.string()), scan::quoted(model->lines.front()),
-                        "plumb_bob");
+  if (model == nullptr) return false;
+  const std::string_view name = model->lines.front();
+  if (name == "equidistant") return true;
+  if (name == "plumb_bob" || name == "rational_polynomial") return false;
+  throw InvalidArgument(checks::in("distortion_model", file.string()), scan::quoted(name),
+                        "plumb_bob or equidistant");
 }
 
 }  // namespace
@@ -168,8 +176,8 @@ OpenCvCamera parse_opencv_camera(const std::filesystem::path& file, std::string_
                   "XML or JSON, expected YAML, which cv::FileStorage writes to names that end with .yml");
   }
   const YamlFile yaml(file, text);
-  refuse_other_models(yaml, file);
-  OpenCvCamera camera{intrinsics_of(yaml, file), distortion_of(yaml, file), {}};
+  OpenCvCamera camera{intrinsics_of(yaml, file), {}, {}};
+  camera.distortion = is_fisheye(yaml, file) ? fisheye_lens(yaml, file) : brown_lens(yaml, file);
   const auto width = yaml.whole_number("image_width"), height = yaml.whole_number("image_height");
   if (!width || !height) return camera;
   for (const int side : {*width, *height}) {

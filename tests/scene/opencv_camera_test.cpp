@@ -44,6 +44,20 @@ TEST_SUITE("unit") {
     CHECK_FALSE(older.distortion);
     CHECK_FALSE(older.size);
   }
+
+  TEST_CASE("the camera of a calibration of a fisheye") {
+    for (const char* const model : {"fisheye_model: 1\n", "distortion_model: equidistant\n"}) {
+      const auto lens = [&](const std::string& data) {
+        return parse(model + k_matrix + matrix("distortion_coefficients", data)).distortion;
+      };
+      CHECK(lens("-0.25, 0.1, 1.e-03, -2.e-03") == fisheye(-0.25F, 0.1F, 1e-3F, -2e-3F));
+      CHECK(lens("0, 0, 0, 0") == fisheye(0, 0, 0, 0));
+      CHECK(message(model + k_matrix) == "camera.yml: a fisheye without distortion_coefficients");
+      CHECK(test::contains(message(model + k_matrix + matrix("distortion_coefficients", "0,0,0,0,0")),
+                           "distortion_coefficients: expected 4 numbers of a fisheye, got 5"));
+    }
+    CHECK_FALSE(parse("fisheye_model: 0\n" + k_matrix).distortion);
+  }
 }
 
 TEST_SUITE("robustness") {
@@ -69,9 +83,8 @@ TEST_SUITE("robustness") {
     CHECK(test::contains(message(k_head + "nonsense\n"), "camera.yml:5: not YAML"));
     CHECK(test::contains(message("flags: 0\nflags: 1\n"), "camera.yml:2: \"flags\" twice"));
     CHECK(test::contains(message("<?xml version=\"1.0\"?>"), "XML or JSON, expected YAML"));
-    CHECK(test::contains(message("fisheye_model: 1\n" + k_matrix),
-                         "fisheye_model (camera.yml): got a fish-eye"));
-    CHECK(test::contains(message("distortion_model: equidistant\n" + k_matrix), "got \"equidistant\""));
+    CHECK(test::contains(message("distortion_model: omnidirectional\n" + k_matrix),
+                         "got \"omnidirectional\", expected plumb_bob or equidistant"));
     CHECK(test::contains(message("image_width: 0\nimage_height: 5\n" + k_matrix), "got 0x5"));
     CHECK(test::contains(message("image_width: w\n" + k_matrix), "camera.yml:1: image_width"));
   }
