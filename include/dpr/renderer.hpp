@@ -38,10 +38,9 @@ struct CameraGradient {
   PoseGradient view;                   ///< of the world-to-camera matrix
   double fov_y_degrees = 0;            ///< 0 where the camera has intrinsics or is orthographic
   std::array<double, 4> intrinsics{};  ///< fx, fy, cx, cy; 0 where the camera has none
-  std::array<double, 5>
-      distortion{};                 ///< k1, k2, p1, p2, k3; 0 unless the camera has a lens of Brown's model
-  std::array<double, 4> fisheye{};  ///< k1, k2, k3, k4; 0 unless the camera has a fisheye
-  double orthographic_height = 0;   ///< 0 where the camera has none
+  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3; 0 without a lens of Brown's model
+  std::array<double, 4> fisheye{};     ///< k1, k2, k3, k4; 0 without a fisheye
+  double orthographic_height = 0;      ///< 0 where the camera has none
 };
 
 struct ViewGradient {

@@ -26,14 +26,14 @@ struct Format {
 };
 
 constexpr std::array<Format, 9> k_image_formats{{{".exr", 4, false},
-                                           {".png", 4, true},
-                                           {".tif", 4, true},
-                                           {".tiff", 4, true},
-                                           {".tga", 4, true},
-                                           {".bmp", 3, true},
-                                           {".jpg", 3, true},
-                                           {".jpeg", 3, true},
-                                           {".ppm", 3, true}}};
+                                                 {".png", 4, true},
+                                                 {".tif", 4, true},
+                                                 {".tiff", 4, true},
+                                                 {".tga", 4, true},
+                                                 {".bmp", 3, true},
+                                                 {".jpg", 3, true},
+                                                 {".jpeg", 3, true},
+                                                 {".ppm", 3, true}}};
 
 const Format& format_of(const std::filesystem::path& file) {
   const std::string extension = lower_case_extension(file);
