@@ -7,7 +7,7 @@ namespace dpr::cli {
 namespace {
 
 constexpr float k_least = 1.0F / 255;  // what 8 bits tell apart
-constexpr int k_most_gain = 256;
+constexpr int k_most_gain = 8;  // more would make what is right look wrong
 
 Image difference(const Image& a, const Image& b) {
   Image result = a;

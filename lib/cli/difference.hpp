@@ -17,7 +17,7 @@ struct Differences {
   std::string caption() const;
 };
 
-/// Images of one size by pairs, as many `a` as `b`. The gain is the largest power of two, up to 256, that
+/// Images of one size by pairs, as many `a` as `b`. The gain is the largest power of two, up to 8, that
 /// leaves 99% of the pixels that differ below 1.
 Differences differences(const std::vector<Image>& a, const std::vector<Image>& b);
 

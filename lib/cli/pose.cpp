@@ -68,11 +68,11 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
     return;
   }
   if (options.search || gives_any(command, k_least_squares_group)) {
-    throw InvalidArgument(
-        "options (command line)",
-        options.search ? "--search with those of the descent"
-                       : "those of least squares with those of the descent",
-        "those of one method: all of the smoothing are the descent's, --search is least squares'");
+    throw InvalidArgument("options (command line)",
+                          options.search ? "--search beside options of the descent"
+                                         : "options of least squares beside those of the descent",
+                          "options of one method: --search is least squares', --method descent and all of "
+                          "the smoothing are the descent's");
   }
   options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
   options.descent.optimizer.kind = parse_optimizer(options.optimizer);
@@ -220,18 +220,22 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   if (!options.report.empty()) make_folder(options.report);
   const PoseResult result = solve(solver, rotation, options.search, common.quiet);
   const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
-  if (writes_csv(options)) {
+  const bool is_table = writes_csv(options);
+  FoundLight light;
+  if (!is_table || !options.report.empty())
+    light = light_of(device, scene, body, target, result, options.least_squares.method);
+  if (is_table) {
     write_bop_result(options.output, options.bop, result);
   } else {
     Json json = pose_to_json(scene, body, result, true_rotation);
-    add_light(json, device, scene, body, target, result, options.least_squares.method);
+    add_light(json, light);
     write_json(options.output, json);
   }
   if (!options.report.empty()) {
     const std::string& source = bop ? options.bop.folder : options.scene;
     const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
     write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, body, target,
-                      result, common.quiet, true_rotation);
+                      result, light, common.quiet, true_rotation);
   }
   if (common.quiet) return;
   print(command, options, result);

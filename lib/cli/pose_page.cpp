@@ -20,8 +20,8 @@ std::string search_text(const PoseResult& result) {
 
 std::string light_text(const PoseResult& result) {
   if (result.light == PoseLight::fixed) return "";
-  return " The target's light is not the scene's: it was found along with the pose. These pictures are in "
-         "the scene's.";
+  return " The target's light is not the scene's: these pictures are in the light that was found along with "
+         "the pose.";
 }
 
 /// Empty where the solver has none.

@@ -17,18 +17,22 @@
 #include "cli/text.hpp"
 #include "dpr/renderer.hpp"
 #include "solve/resample.hpp"
-#include "solve/scene_light.hpp"
 
 namespace dpr::cli {
 namespace {
 
 constexpr std::size_t k_strip_length = 12;  // the start among them
 
-/// Renders the scene with its body in any pose.
+/// Renders the scene with its body in any pose, in a light that was found.
 class PoseCamera {
  public:
-  PoseCamera(const Device& device, const Scene& scene, const PoseBody& body)
-      : renderer_(device), body_(body), camera_(scene.camera) {
+  PoseCamera(const Device& device, Scene scene, const PoseBody& body, const FoundLight& light)
+      : renderer_(device),
+        body_(body),
+        camera_(scene.camera),
+        background_(scene.background),
+        gain_(light.gain) {
+    if (light.gain || light.lights) scene.lights = light.lights;
     renderer_.set_scene(scene);
   }
 
@@ -45,12 +49,22 @@ class PoseCamera {
     renderer_.set_views({&view, 1});
     renderer_.set_smoothing(smoothing);
     renderer_.forward();
-    return renderer_.image();
+    Image image = renderer_.image();
+    if (!gain_) return image;
+    for (glm::vec4& pixel : image.pixels) {
+      const glm::vec3 behind = (1 - pixel.w) * background_;
+      const glm::vec3 object =
+          (glm::vec3(pixel) - behind) * glm::vec3(gain_->gain) + pixel.w * glm::vec3(gain_->offset);
+      pixel = glm::vec4(object + behind, pixel.w);
+    }
+    return image;
   }
 
   Renderer renderer_;
   const PoseBody& body_;
   Camera camera_;
+  glm::vec3 background_;
+  std::optional<ColorGain> gain_;
 };
 
 /// ", 3.20 degrees from the truth" where that is known.
@@ -213,9 +227,9 @@ Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& re
   return json;
 }
 
-void add_light(Json& json, const Device& device, const Scene& of, const PoseBody& body, const Image& target,
-               const PoseResult& result, const LeastSquares& method) {
-  if (result.light == PoseLight::fixed) return;
+FoundLight light_of(const Device& device, const Scene& of, const PoseBody& body, const Image& target,
+                    const PoseResult& result, const LeastSquares& method) {
+  if (result.light == PoseLight::fixed) return {};
   constexpr float k_blur_pixels = 0.25F, k_robust_scale = 0.1F;  // of a robust fit that leaves it open
   Scene scene = of;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(scene.width, scene.height));  // NDC
@@ -227,33 +241,35 @@ void add_light(Json& json, const Device& device, const Scene& of, const PoseBody
   const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
   const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
   const float scale = method.robust ? open_scale : 0;
-  if (result.light == PoseLight::gain) {
-    const auto found = find_gain(device, scene, view, scale);
-    if (!found) return;
-    json["gain"] = to_json(found->gain);
-    json["offset"] = to_json(found->offset);
-  } else if (const auto light = find_light(device, scene, {&view, 1}, scale)) {
-    add_found_light(json, *light);
+  if (result.light == PoseLight::gain) return {.gain = find_gain(device, scene, view, scale)};
+  return {.lights = find_light(device, scene, {&view, 1}, scale)};
+}
+
+void add_light(Json& json, const FoundLight& light) {
+  if (light.gain) {
+    json["gain"] = to_json(light.gain->gain);
+    json["offset"] = to_json(light.gain->offset);
   }
+  if (light.lights) add_found_light(json, *light.lights);
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
                        const Scene& scene, const PoseBody& body, const Image& target,
-                       const PoseResult& result, bool quiet, const std::optional<glm::dmat3>& truth) {
+                       const PoseResult& result, const FoundLight& light, bool quiet,
+                       const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
-  PoseCamera camera(device, scene, body);
+  PoseCamera camera(device, scene, body, light);
   const Image start = camera.render_start(result);
   const Image end = camera.render(result, rigid_smoothing());
   const Differences difference = differences({end}, {target});
-  const char* const other_light = result.light == PoseLight::harmonics ? "; not in the target's light" : "";
-  PosePictures pictures{write_picture(folder / "target.png", target, "target"),
-                        write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
-                        write_picture(folder / "end.png", end,
-                                      format("end, after %u iterations", result.iterations) +
-                                          angle_text(result.pose, truth) + other_light),
-                        write_picture(folder / "difference.png", difference.images.front(),
-                                      difference.caption() + ": end and target" + other_light),
-                        write_frames(folder / "iterations.png", camera, result, truth)};
+  PosePictures pictures{
+      write_picture(folder / "target.png", target, "target"),
+      write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
+      write_picture(folder / "end.png", end,
+                    format("end, after %u iterations", result.iterations) + angle_text(result.pose, truth)),
+      write_picture(folder / "difference.png", difference.images.front(),
+                    difference.caption() + ": end and target"),
+      write_frames(folder / "iterations.png", camera, result, truth)};
   pictures.has_plot = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
   if (!pictures.has_plot && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   write_pose_page(folder / "index.html", source, result, pictures, truth);

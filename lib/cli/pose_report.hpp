@@ -13,6 +13,7 @@
 #include "dpr/light.hpp"
 #include "dpr/pose.hpp"
 #include "solve/pose_body.hpp"
+#include "solve/scene_light.hpp"
 
 namespace dpr::cli {
 
@@ -35,15 +36,22 @@ Json covariance_to_json(const std::vector<double>& covariance);
 Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& result,
                   const std::optional<glm::dmat3>& truth = {});
 
-/// Adds the light that was found along with the pose to pose.json, as find_light() and find_gain() have it.
-void add_light(Json& json, const Device& device, const Scene& scene, const PoseBody& body,
-               const Image& target, const PoseResult& result, const LeastSquares& method);
+/// A light that was found along with a pose, by find_gain() or find_light(); neither: the scene's own.
+struct FoundLight {
+  std::optional<ColorGain> gain;
+  std::optional<Lights> lights;
+};
+FoundLight light_of(const Device& device, const Scene& scene, const PoseBody& body, const Image& target,
+                    const PoseResult& result, const LeastSquares& method);
+/// Adds it to pose.json.
+void add_light(Json& json, const FoundLight& light);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
-/// them. Throws IoError.
+/// them, all in that light. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
                        const Scene& scene, const PoseBody& body, const Image& target,
-                       const PoseResult& result, bool quiet, const std::optional<glm::dmat3>& truth = {});
+                       const PoseResult& result, const FoundLight& light, bool quiet,
+                       const std::optional<glm::dmat3>& truth = {});
 
 }  // namespace dpr::cli

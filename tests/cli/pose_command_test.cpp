@@ -37,6 +37,16 @@ void write_inputs(const TempDir& folder) {
   REQUIRE(run_line(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
 }
 
+/// Mean difference of colours between the end and the target that a report shows.
+double difference_on_page(const TempDir& folder) {
+  const dpr::Image end = dpr::read_image(folder / "page/end.png");
+  const dpr::Image target = dpr::read_image(folder / "page/target.png");
+  double sum = 0;
+  for (std::size_t i = 0; i < target.pixels.size(); ++i)
+    sum += static_cast<double>(glm::length(glm::vec3(end.pixels[i] - target.pixels[i])));
+  return sum / static_cast<double>(target.pixels.size());
+}
+
 /// R[0][0] and R[0][2] of the truth are cos 0.8 and sin 0.8.
 void check_is_truth(const json& pose) {
   CHECK(pose["rotation_matrix"][0][0].get<double>() == doctest::Approx(0.696707).epsilon(0.02));
@@ -149,8 +159,11 @@ TEST_SUITE("pipeline") {
           {k == 0 ? 2.0 : 0.5 / k, k == 0 ? 1.5 : 0.2, k == 0 ? 1.0 : -0.1});
     folder.write("lit.json", truth.dump());
     REQUIRE(run_line(folder, "render --scene lit.json --preset rigid -o target.exr --quiet").status == 0);
-    REQUIRE(run_line(folder, "pose --scene scene.json --target target.exr --search -o pose.json --quiet")
-                .status == 0);
+    REQUIRE(
+        run_line(folder,
+                 "pose --scene scene.json --target target.exr --search -o pose.json --report page --quiet")
+            .status == 0);
+    CHECK(difference_on_page(folder) < 0.01);
     const json pose = json::parse(folder.read("pose.json"));
     REQUIRE(pose["light"] == "harmonics");
     REQUIRE(pose["harmonics"].size() == 9);
@@ -183,8 +196,9 @@ TEST_SUITE("pipeline") {
     dpr::write_image(folder / "target.exr", target);
     REQUIRE(run_line(folder,
                      "pose --scene scene.json --target target.exr --initial-rotation 0,0.6,0 --light gain "
-                     "-o pose.json --quiet")
+                     "-o pose.json --report page --quiet")
                 .status == 0);
+    CHECK(difference_on_page(folder) < 0.01);
     const json pose = json::parse(folder.read("pose.json"));
     check_is_truth(pose);
     REQUIRE(pose["light"] == "gain");
@@ -325,7 +339,7 @@ TEST_SUITE("robustness") {
     check("--depth far.exr", "expected some from znear to zfar");
     check("--target target.exr --depth-scale 1", "--depth-scale (command line): got no --depth");
     check("--silhouette target.exr --report report", "--report (command line): got no --target");
-    check("--silhouette target.exr --iterations 4", "those of least squares with those of the descent");
+    check("--silhouette target.exr --iterations 4", "options of least squares beside those of the descent");
   }
 }
 

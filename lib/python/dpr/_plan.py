@@ -68,12 +68,12 @@ def pixels(name, value):
 
 
 def require_names(given, known):
-    """Fails for a keyword that there is not, and tells the nearest."""
+    """Fails for a keyword that there is not, and tells the nearest, or all where none is near."""
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
-            hint = f"; did you mean '{near[0]}'?" if near else ""
-            fail(InvalidName, "name", f'"{name}"', "one of " + ", ".join(dict.fromkeys(known)) + hint)
+            fail(InvalidName, "name", f'"{name}"', f"a name that there is; did you mean '{near[0]}'?" if near else
+                 "one of " + ", ".join(dict.fromkeys(known)))
 
 
 def power_of_blur(renderer_settings, width, height):
