@@ -222,10 +222,11 @@ class ArgumentsTest(unittest.TestCase):
                 dpr.render(vertices, faces, np.repeat(views, count, 0), intrinsics, width=SIZE, height=SIZE, zfar=zfar)
             return [str(warning.message) for warning in found]
 
-        beyond = "dpr: {} triangles reach beyond zfar ({}) and were dropped whole"
+        beyond = "dpr: {} triangles lie beyond zfar ({}) and were left out"
         self.assertEqual(told(both, faces, 20), [])
         self.assertEqual(told(both, faces, None), [])
         self.assertEqual(told(both, faces[:2], 5), [])  # a vertex of no face
+        self.assertEqual(told(near - np.float32([[0, 0, 0], [0, 0, 0], [0, 0, 9]]), faces[:1], 5), [])  # drawn whole
         self.assertEqual(told(both, faces, 5), [beyond.format(1, 5)])
         self.assertEqual(told(both, faces, 4.25, 2), [beyond.format(4, 4.25)])
         self.assertEqual(told(np.stack([near, near - np.float32([0, 0, 9])]), faces[:1], 5), [beyond.format(1, 5)])

@@ -138,18 +138,18 @@ def shapes_of(spec, views):
 
 
 def _faces_beyond(zfar, vertices, faces, views):
-    """Number of triangles, of all views, with a vertex behind the plane."""
+    """Number of triangles, of all views, that lie behind the plane."""
     axes = views[:, 2, :]
     depths = -(vertices @ axes[:, :3, None])[..., 0] - axes[:, 3:]
     is_beyond = depths > zfar * (1 + _ROUNDING)
-    return int(is_beyond[:, faces].any(2).sum()) if is_beyond.any() else 0
+    return int(is_beyond[:, faces].all(2).sum()) if is_beyond.any() else 0
 
 
 def _warning(frame, zfar, arrays):
     if frame.is_empty():
         return NOTHING_RENDERED
     count = _faces_beyond(zfar, arrays["vertices"], arrays["faces"], arrays["views"]) if zfar is not None else 0
-    return f"dpr: {count} triangles reach beyond zfar ({zfar:g}) and were dropped whole" if count else None
+    return f"dpr: {count} triangles lie beyond zfar ({zfar:g}) and were left out" if count else None
 
 
 class Rendered:
