@@ -211,6 +211,25 @@ class ArgumentsTest(unittest.TestCase):
         of_padded = renderer(np.stack([TETRAHEDRON] * 2), padded, views[:2], intrinsics[:2])
         self.assertEqual([of_padded[i, ..., 3].max() > 0.5 for i in range(2)], [True, False])
 
+    def test_a_camera_without_a_first_dimension(self):
+        (view,), (lens,) = cameras(1)
+        renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)
+        expected, pull_expected = renderer.vjp(TETRAHEDRON, FACES, view[None], lens[None])
+        image, pullback = renderer.vjp(TETRAHEDRON, FACES, view, lens)
+        np.testing.assert_array_equal(image, expected)
+        found = pullback(image)
+        for name, gradient in pull_expected(image).items():
+            np.testing.assert_array_equal(found[name], gradient[0] if name in ("views", "intrinsics") else gradient)
+        shapes = np.stack([TETRAHEDRON, 0.9 * TETRAHEDRON])
+        np.testing.assert_array_equal(renderer(shapes, FACES, view, lens), renderer(shapes, FACES, view[None], lens[None]))
+        tangent = random(1, 4, 4)
+        np.testing.assert_array_equal(
+            renderer.jvp(shapes, FACES, view, lens, tangents={"views": tangent})[1],
+            renderer.jvp(shapes, FACES, view[None], lens[None], tangents={"views": tangent[None]})[1])
+        self.assertEqual(renderer.subdivide(TETRAHEDRON, FACES, view, lens).faces.shape, (4, 3))
+        with self.assertRaisesRegex(ValueError, r"views .* got \[4\], expected \[N, 4, 4\] or \[4, 4\]"):
+            renderer(TETRAHEDRON, FACES, view[0], lens)
+
     def test_warns_of_triangles_beyond_zfar(self):
         views, intrinsics = dpr.look_at([0, 0, 4]), dpr.perspective(40, SIZE, SIZE)
         near = np.float32([[-1, -1, 0], [1, -1, 0], [0, 1, 0]])

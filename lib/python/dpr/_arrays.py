@@ -80,6 +80,11 @@ def converted(name, array, is_indices=False, where="dpr.render"):
     return array if type_of(array) == wanted else as_type(array, wanted)
 
 
+def batched(array):
+    """[...] as [1, ...]; a differentiable function of tensors."""
+    return (array if module_of(array) in ("torch", "jax") else to_numpy(array))[None]
+
+
 def repeated(array, count):
     """[1, ...] as [count, ...]; a differentiable function of tensors."""
     shape, kind = (count, *array.shape[1:]), module_of(array)
@@ -116,9 +121,10 @@ def to_numpy(array):
 
 
 def restored(array, gradient):
-    """The gradient of an array from that of what it was converted to, and repeated in the first dimension."""
+    """The gradient of an array from that of what it was converted to, and repeated in the first dimension, which it may
+    be without."""
     if gradient.shape != tuple(array.shape):
-        gradient = gradient.sum(0, keepdims=True)
+        gradient = gradient.sum(0, keepdims=gradient.ndim == len(array.shape))
     return as_type(like(array, gradient), type_of(array))
 
 

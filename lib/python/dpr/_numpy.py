@@ -63,7 +63,7 @@ def tangents_of_leaves(plan, tangents):
         if tangent.shape != (count, *given.shape) or not count:
             _arrays.fail(ValueError, name, list(tangent.shape), f"[{', '.join(map(str, (count or 'K', *given.shape)))}]")
         if leaf.shape != given.shape:
-            tangent = np.repeat(tangent, leaf.shape[0], 1)
+            tangent = np.repeat(tangent.reshape(count, -1, *leaf.shape[1:]), leaf.shape[0], 1)
         found[number] = tangent * plan.slopes[number]() if number in plan.slopes else tangent
     if not found:
         _arrays.fail(ValueError, "tangents", "none", "those of one array at least")

@@ -130,6 +130,14 @@ class Plan:
         self.paths.append(path)
         return len(self.leaves) - 1, row, count
 
+    def add_camera(self, views, intrinsics):
+        """The same of both; what has no first dimension, of views, gets one."""
+        found = self.add(("views",), views), self.add(("intrinsics",), intrinsics)
+        for (number, _, _), dimensions in zip(found, (3, 2)):
+            if len(self.leaves[number].shape) == dimensions - 1:
+                self.leaves[number] = _arrays.batched(self.leaves[number])
+        return found
+
     def repeat(self, number, count):
         """Makes an array of one view one of as many."""
         if count != 1 and self.leaves[number].shape[0] == 1:
@@ -268,10 +276,10 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
     if smoothing["sigma"] is not None and smoothing["blur"] is not None:
         fail(ValueError, "blur", "blur and sigma", "one of them")
     plan, settings, shared, of_views = Plan(copy), list(renderer._texts), {}, {}
-    of_views["views"], of_views["intrinsics"] = plan.add(("views",), views), plan.add(("intrinsics",), intrinsics)
+    of_views["views"], of_views["intrinsics"] = plan.add_camera(views, intrinsics)
     views, intrinsics = plan.leaves
     if len(views.shape) != 3:
-        fail(_library.InvalidArgument, "views", list(views.shape), "[N, 4, 4]")
+        fail(_library.InvalidArgument, "views", list(views.shape), "[N, 4, 4] or [4, 4]")
     lights_given = {name: _arrays.from_numbers(array) for name, array in dictionary("lights", lights).items()}
     count = _count_views((views, intrinsics), mesh, lights_given)
     if len(intrinsics.shape) == 2:

@@ -106,8 +106,8 @@ class Renderer:
         vertices     [V, 3] or [N, V, 3], world space
         faces        [F, 3], int64 or int32: indices of vertices
         views        [N, 4, 4], world to camera, acting on column vectors; the camera looks down -z, y is up (OpenGL).
-                     dpr.look_at(), dpr.perspective() and dpr.cameras make views and intrinsics. One of either, and one
-                     mesh, go with N of the others
+                     dpr.look_at(), dpr.perspective() and dpr.cameras make views and intrinsics. One of either, with or
+                     without the first dimension, and one mesh go with N of the others
         intrinsics   [N, 4], fx, fy, cx, cy in pixels from the corner of the top-left pixel (OpenCV's cx and cy plus
                      0.5); [N, 9], the same and OpenCV's k1, k2, p1, p2, k3; [N, 8], the same and its fisheye's k1 to
                      k4; [N, 1], orthographic: world units from the lower to the upper edge
@@ -269,8 +269,9 @@ class Renderer:
         Returns a Subdivision: its faces and of_vertices(vertices) are to be rendered. The cut itself has no derivative.
         """
         plan = _plan.Plan(copy)
-        for name, array in (("vertices", vertices), ("faces", faces), ("views", views), ("intrinsics", intrinsics)):
-            plan.add((name,), array, name == "faces")
+        plan.add(("vertices",), vertices)
+        plan.add(("faces",), faces, True)
+        plan.add_camera(views, intrinsics)
         _, _, tolerance = _plan.setting("tolerance", tolerance).partition("=")
         arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(leaf))) for (name,), leaf in zip(plan.paths, plan.leaves)]
         cut = Subdivision(self._spec(), arrays, float(tolerance), plan.given[0])
