@@ -123,7 +123,7 @@ class Renderer:
         materials    a dictionary of what highlights are multiplied by and their exponents: "specular" [M, 3] (1 if left
                      out), "shininess" [M] (the lights' if left out)
         face_materials  [F], int64 or int32: the faces' materials; all have the first unless given
-        background   [3], linear RGB; black unless given
+        background   [3], linear RGB; black unless given. A picture: image[..., :3] + (1 - image[..., 3:]) * picture
         lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
                      [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"
                      [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading
