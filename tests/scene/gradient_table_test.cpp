@@ -85,7 +85,7 @@ TEST_SUITE("unit") {
     });
     constexpr int k_meshes = 3 * (3 + 2 + 4) + 2 * 5 + 3 * (6 + 1), k_shapes = 3 * (5 + 1),
                   k_lights = 3 + 3 * 9 + (2 + 3) * 9 + 14;
-    constexpr int k_views = 2 * (6 + 1 + 4 + 1 + 5 + 2 * 6), k_rest = 3 + 3;
+    constexpr int k_views = 2 * (6 + 1 + 4 + 1 + 5 + 4 + 2 * 6), k_rest = 3 + 3;
     CHECK(count == k_meshes + k_shapes + k_lights + k_views + k_rest);
     CHECK(gradient.meshes[0].texcoords[4].y != 0);
     CHECK(gradient.meshes[0].textures[1][0].z != 0);
