@@ -241,8 +241,8 @@ FoundLight light_of(const Device& device, const Scene& of, const PoseBody& body,
   const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
   const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
   const float scale = method.robust ? open_scale : 0;
-  if (result.light == PoseLight::gain) return {.gain = find_gain(device, scene, view, scale)};
-  return {.lights = find_light(device, scene, {&view, 1}, scale)};
+  if (result.light == PoseLight::gain) return {find_gain(device, scene, view, scale), {}};
+  return {{}, find_light(device, scene, {&view, 1}, scale)};
 }
 
 void add_light(Json& json, const FoundLight& light) {
