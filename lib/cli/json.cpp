@@ -105,7 +105,7 @@ Json camera_to_json(const Camera& camera) {
 
 void add_lens(Json& json, const Camera& camera) {
   if (!camera.distortion) return;
-  Json& list = json[camera.distortion->model == LensModel::fisheye ? "fisheye" : "distortion"];
+  Json& list = json[is_fisheye(camera) ? "fisheye" : "distortion"];
   for (const float coefficient : coefficients(*camera.distortion)) list.push_back(number(coefficient));
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "renderer/renderer_impl.hpp"
+#include "scene/lens.hpp"
 #include "scene/light_table.hpp"
 #include "scene/projection_slopes.hpp"
 
@@ -143,7 +144,7 @@ void add_projection_gradient(const std::array<double, 4>& grad, const Camera& ca
 
 /// Sets the derivatives of the coefficients of a camera's lens, which are in the lens' order.
 void set_lens(CameraGradient& gradient, const Camera& camera, const std::array<double, 5>& lens) {
-  if (camera.distortion && camera.distortion->model == LensModel::fisheye) {
+  if (is_fisheye(camera)) {
     std::copy_n(lens.begin(), gradient.fisheye.size(), gradient.fisheye.begin());
   } else {
     gradient.distortion = lens;

@@ -7,6 +7,7 @@
 #include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/tangents.hpp"
+#include "scene/lens.hpp"
 #include "scene/projection_slopes.hpp"
 
 namespace dpr {
@@ -85,8 +86,8 @@ shared::ViewTangent view_tangent(const CameraGradient& by, const Camera& camera,
   t.rotation = float4_of(by.view.rotation);
   t.translation = float4_of(by.view.translation);
   for (std::size_t k = 0; k < 4; ++k) t.projection.s[k] = static_cast<float>(projection[k]);
-  const bool is_fisheye = camera.distortion && camera.distortion->model == LensModel::fisheye;
-  const std::span<const double> lens = is_fisheye ? std::span<const double>(by.fisheye) : by.distortion;
+  const std::span<const double> lens =
+      is_fisheye(camera) ? std::span<const double>(by.fisheye) : by.distortion;
   for (std::size_t k = 0; k < lens.size(); ++k) t.lens[k / 4].s[k % 4] = static_cast<float>(lens[k]);
   t.eye = float4_of(glm::inverse(dmat3(view)) * moved);
   return t;

@@ -8,6 +8,7 @@
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
+#include "scene/lens.hpp"
 #include "scene/light_table.hpp"
 
 namespace dpr {
@@ -30,11 +31,8 @@ bool has_field_of_view(const Scene& scene) {
   return !scene.camera.intrinsics && !scene.camera.orthographic_height;
 }
 bool has_intrinsics(const Scene& scene) { return scene.camera.intrinsics.has_value(); }
-bool has_lens(const Scene& scene, LensModel model) {
-  return scene.camera.distortion && scene.camera.distortion->model == model;
-}
-bool has_distortion(const Scene& scene) { return has_lens(scene, LensModel::brown); }
-bool has_fisheye(const Scene& scene) { return has_lens(scene, LensModel::fisheye); }
+bool has_fisheye(const Scene& scene) { return is_fisheye(scene.camera); }
+bool has_distortion(const Scene& scene) { return scene.camera.distortion && !has_fisheye(scene); }
 bool is_orthographic(const Scene& scene) { return scene.camera.orthographic_height.has_value(); }
 bool has_lights(const Scene& scene) { return scene.lights.has_value(); }
 bool has_harmonics(const Scene& scene) { return has_lights(scene) && !scene.lights->harmonics.empty(); }

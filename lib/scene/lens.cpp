@@ -55,6 +55,10 @@ glm::dvec2 without_fisheye(const glm::dvec2& seen, const Distortion& lens) {
 
 }  // namespace
 
+bool is_fisheye(const Camera& camera) {
+  return camera.distortion && camera.distortion->model == LensModel::fisheye;
+}
+
 double radial_factor(const Distortion& d, double radius2) {
   constexpr double k_least = 1e-20;  // squared tangent: the angle is the tangent there
   double angle2 = radius2, stretch = 1;

@@ -9,6 +9,8 @@
 
 namespace dpr {
 
+bool is_fisheye(const Camera& camera);
+
 /// Factor by which a lens moves a point of that squared tangent from the axis, without p1 and p2 and beyond
 /// largest_radius() too; as kernels/lens.h has it.
 double radial_factor(const Distortion& lens, double radius2);

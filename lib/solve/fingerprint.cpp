@@ -16,7 +16,7 @@ void add(Hash& hash, const Camera& camera) {
     hash.add(value);
   if (camera.distortion) {
     for (const float value : coefficients(*camera.distortion)) hash.add(value);
-    if (camera.distortion->model == LensModel::fisheye) hash.add(1);  // not Brown's without k3
+    if (is_fisheye(camera)) hash.add(1);  // not Brown's without k3
   }
   if (camera.orthographic_height) hash.add(*camera.orthographic_height);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "scene/lens.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
@@ -13,10 +14,6 @@ namespace dpr {
 namespace {
 
 constexpr std::size_t k_translation = 3;  // where its parameters begin
-
-bool is_fisheye(const Camera& camera) {
-  return camera.distortion && camera.distortion->model == LensModel::fisheye;
-}
 
 /// The lens that a camera has, and where it is not known some as strong as there are.
 std::vector<Camera> possible_lenses(const Camera& camera, bool is_unknown) {
