@@ -147,6 +147,7 @@ struct PoseIteration {
   Pose pose;                  ///< of the best
   double focal_scale = 1;     ///< of the best
   dvec2 radial{0.0};          ///< of the best
+  std::size_t body = 0;       ///< number of the body, of several
 };
 
 /// Why a pose does not count as explaining the target: what leaves little more than it.
@@ -225,5 +226,24 @@ class DPR_API PoseSolver {
   Image target_;
   PoseOptions options_;
 };
+
+/// Meshes of the bodies that move in a scene, each on its own: [body] is a list as PoseOptions::meshes. Meshes in no
+/// list stand still.
+using PoseBodies = std::vector<std::vector<std::size_t>>;
+
+/// Finds the poses of several bodies in one picture, in which they may hide each other: [body]. The initial poses are
+/// the scene's. Each body is fitted in turn while the others stand where they were found last: robustly first, then
+/// with all of them in the picture, then in rounds until none moves any more. A result is judged with the others at
+/// their places: `explained` is true if all bodies together explain the picture. Light that is found along with the
+/// poses is the same for all bodies, and is looked for where the scene's own light does not explain the picture.
+/// LeastSquares without box and silhouette, neither focal length nor distortion to look for, and PoseOptions::meshes
+/// empty. One body is fitted as by PoseSolver. Throws InvalidArgument as that does, and for a mesh in two bodies.
+DPR_API std::vector<PoseResult> solve_bodies(const Device& device, const Scene& scene, const Image& target,
+                                             const PoseBodies& bodies, const PoseOptions& options = {},
+                                             const PoseSolver::Callback& callback = {});
+/// Does the same from unknown poses, as PoseSolver::search() does.
+DPR_API std::vector<PoseResult> search_bodies(const Device& device, const Scene& scene, const Image& target,
+                                              const PoseBodies& bodies, const PoseOptions& options = {},
+                                              const PoseSolver::Callback& callback = {});
 
 }  // namespace dpr

@@ -125,10 +125,10 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   const Pose start{rotation_from_vector(turn) * truth.rotation, truth.translation};
   const PoseResult result = solver.solve(start, progress_callback(solver.most_iterations(), common.quiet));
   write_inputs(folder, device, scene, truth, start, target);
-  const PoseBody body(scene, {});
-  write_json(std::filesystem::path(folder) / "pose.json", pose_to_json(scene, body, result, truth.rotation));
+  const FoundBody found{{}, result};
+  write_json(std::filesystem::path(folder) / "pose.json", poses_to_json(scene, {&found, 1}, truth.rotation));
   write_pose_report(folder, page_source("A cube's pose, found from 50 degrees away", common, {&device, 1}),
-                    device, scene, body, target, result, {}, common.quiet, truth.rotation);
+                    device, scene, {&found, 1}, target, {}, common.quiet, truth.rotation);
   if (!common.quiet) {
     std::printf("%s: from %.1f to %.2f degrees from the truth in %u iterations, %.1f s\n", folder.c_str(),
                 angle_degrees(start.rotation, truth.rotation),

@@ -1,7 +1,5 @@
 #include "cli/moving_meshes.hpp"
 
-#include <algorithm>
-
 #include "base/from_chars.hpp"
 #include "base/name_list.hpp"
 #include "dpr/error.hpp"
@@ -17,20 +15,24 @@ namespace {
 
 }  // namespace
 
-std::vector<std::size_t> parse_moving_meshes(const std::string& text, const Scene& scene) {
-  if (text.empty() && scene.meshes.size() > 1) refuse("none", scene);
-  if (text.empty()) return {};
-  std::vector<std::size_t> meshes;
-  for (const std::string& item : split_list(text)) {
-    const char* const end = item.data() + item.size();
-    std::size_t mesh = 0;
-    const bool is_number = !item.empty() && from_chars(item.data(), end, mesh).ptr == end;
-    if (!is_number || mesh >= scene.meshes.size() || std::ranges::count(meshes, mesh) > 0)
-      refuse("\"" + text + "\"", scene);
-    meshes.push_back(mesh);
+PoseBodies parse_moving_meshes(const std::vector<std::string>& texts, const Scene& scene) {
+  if (texts.empty() && scene.meshes.size() > 1) refuse("none", scene);
+  if (texts.empty()) return {{}};
+  PoseBodies bodies;
+  std::vector<bool> is_named(scene.meshes.size());
+  for (const std::string& text : texts) {
+    std::vector<std::size_t>& meshes = bodies.emplace_back();
+    for (const std::string& item : split_list(text)) {
+      const char* const end = item.data() + item.size();
+      std::size_t mesh = 0;
+      const bool is_number = !item.empty() && from_chars(item.data(), end, mesh).ptr == end;
+      if (!is_number || mesh >= scene.meshes.size() || is_named[mesh]) refuse("\"" + text + "\"", scene);
+      is_named[mesh] = true;
+      meshes.push_back(mesh);
+    }
+    if (meshes.empty()) refuse("\"" + text + "\"", scene);
   }
-  if (meshes.empty()) refuse("\"" + text + "\"", scene);
-  return meshes;
+  return bodies;
 }
 
 }  // namespace dpr::cli

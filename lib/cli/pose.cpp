@@ -19,6 +19,7 @@
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
+#include "solve/pose_body.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -31,8 +32,9 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, meshes, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
-                                                       output, report;
+  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
+                                               report;
+  std::vector<std::string> meshes;  // of each body
   PosePictureFiles pictures;
   BopOptions bop;  // no folder: a scene
   std::optional<std::string> method, box;
@@ -83,13 +85,34 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   options.solver.method = options.descent;
 }
 
-PoseResult solve(const PoseSolver& solver, const std::optional<glm::dmat3>& rotation, bool search,
-                 bool quiet) {
-  const PoseSolver::Callback callback = progress_callback(solver.most_iterations(), quiet);
-  if (search) return solver.search(callback);
+/// The poses of all bodies, [body].
+std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& options, const Device& device,
+                             const Scene& scene, const Image& target, const PoseBodies& bodies, bool quiet) {
+  const std::string turn = "--initial-rotation (command line)";
+  const bool is_turned = !options.initial_rotation.empty();
+  if (is_turned && bodies.size() > 1)
+    throw InvalidArgument(turn, "one beside several --mesh", "none, or one --mesh");
+  const auto named = [&](const auto& work) {
+    return with_option_names(command, {{"iterations", "--level-iterations"}}, work);
+  };
+  PoseOptions first = options.solver;
+  first.meshes = bodies.front();
+  const PoseSolver solver = named([&] { return PoseSolver(device, scene, target, first); });
+  if (!options.report.empty()) make_folder(options.report);
+  const unsigned fits = bodies.size() > 1 ? k_most_fits * static_cast<unsigned>(bodies.size()) : 1;
+  const PoseSolver::Callback callback = progress_callback(fits * solver.most_iterations(), quiet);
+  if (bodies.size() > 1) {
+    const auto find = options.search ? search_bodies : solve_bodies;
+    std::vector<FoundBody> found;
+    for (PoseResult& result :
+         named([&] { return find(device, scene, target, bodies, options.solver, callback); }))
+      found.push_back({bodies[found.size()], std::move(result)});
+    return found;
+  }
+  if (options.search) return {{bodies.front(), solver.search(callback)}};
   Pose initial = solver.scene_pose();
-  if (rotation) initial.rotation = *rotation;
-  return solver.solve(initial, callback);
+  if (is_turned) initial.rotation = rotation_from_vector(parse_vector(options.initial_rotation, turn));
+  return {{bodies.front(), solver.solve(initial, callback)}};
 }
 
 /// Options that were not given and may help if the target is not explained.
@@ -100,22 +123,27 @@ std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
   };
   add("--search", "forgets the start");
   add("--translation", "finds a displaced object");
-  add("--focal", "finds an unknown focal length");
-  add("--distortion", "finds a lens");
+  if (options.meshes.size() < 2) {
+    add("--focal", "finds an unknown focal length");
+    add("--distortion", "finds a lens");
+  }
   add("--robust", "is for clutter and occlusion");
   if (options.least_squares.light == name_of(PoseLight::fixed))
     text += (text.empty() ? "" : "; ") + std::string("--light harmonics for another light");
   return text.empty() ? "" : ": " + text;
 }
 
-void print(const CLI::App& command, const PoseCommandOptions& options, const PoseResult& result) {
-  std::printf("%s: loss %.6g after %u iterations, %.1f s\n", options.output.c_str(), result.loss,
-              result.iterations, result.seconds);
-  if (!result.explained) {
-    std::printf("The target is not explained: %s. The pose may be wrong%s.\n", doubt_text(result).c_str(),
-                advice(command, options).c_str());
-  } else if (result.equals.size() > 1) {
-    std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
+void print(const CLI::App& command, const PoseCommandOptions& options, const std::vector<FoundBody>& found) {
+  for (const FoundBody& body : found) {
+    const PoseResult& result = body.result;
+    std::printf("%s%s: loss %.6g after %u iterations, %.1f s\n", options.output.c_str(),
+                suffix_of(body, found.size()).c_str(), result.loss, result.iterations, result.seconds);
+    if (!result.explained) {
+      std::printf("The target is not explained: %s. The pose may be wrong%s.\n", doubt_text(result).c_str(),
+                  advice(command, options).c_str());
+    } else if (result.equals.size() > 1) {
+      std::printf("%zu poses that explain the target equally well are in the file.\n", result.equals.size());
+    }
   }
 }
 
@@ -198,11 +226,6 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   // The outputs are checked before the work.
   require_writable(options.output);
   check_scene_options(options);
-  std::optional<glm::dmat3> rotation;
-  if (!options.initial_rotation.empty()) {
-    rotation =
-        rotation_from_vector(parse_vector(options.initial_rotation, "--initial-rotation (command line)"));
-  }
   std::optional<BopImage> bop;
   if (!options.bop.folder.empty()) bop = begin_bop(command, options);
   const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
@@ -211,35 +234,30 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
-  options.solver.meshes = parse_moving_meshes(options.meshes, scene);
+  const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
   const Device device = open_device(common);
-  const PoseSolver solver = with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
-    return PoseSolver(device, scene, target, options.solver);
-  });
-  const PoseBody body(scene, options.solver.meshes);
-  if (!options.report.empty()) make_folder(options.report);
-  const PoseResult result = solve(solver, rotation, options.search, common.quiet);
+  const std::vector<FoundBody> found = solve(command, options, device, scene, target, bodies, common.quiet);
   const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
   const bool is_table = writes_csv(options);
   FoundLight light;
   if (!is_table || !options.report.empty())
-    light = light_of(device, scene, body, target, result, options.least_squares.method);
+    light = light_of(device, scene, found, target, options.least_squares.method);
   if (is_table) {
-    write_bop_result(options.output, options.bop, result);
+    write_bop_result(options.output, options.bop, found.front().result);
   } else {
-    Json json = pose_to_json(scene, body, result, true_rotation);
+    Json json = poses_to_json(scene, found, true_rotation);
     add_light(json, light);
     write_json(options.output, json);
   }
   if (!options.report.empty()) {
     const std::string& source = bop ? options.bop.folder : options.scene;
     const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
-    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, body, target,
-                      result, light, common.quiet, true_rotation);
+    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, found, target,
+                      light, common.quiet, true_rotation);
   }
   if (common.quiet) return;
-  print(command, options, result);
-  print_reference(result, truth);
+  print(command, options, found);
+  print_reference(found.front().result, truth);
 }
 
 /// Those that are a single image's beside the shared ones.
@@ -252,9 +270,8 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
   add("--blur-end", method.blur_end, "The blur at the very end; 0.1 by default", "FLOAT");
   add("--box", options.box,
       "Box about the object in the picture, in pixels as given, from its upper left corner: what lies "
-      "further away than "
-      "a quarter of the larger side is not looked at, and with --translation poses are tried that fill the "
-      "box",
+      "further away than a quarter of the larger side is not looked at, and with --translation poses are "
+      "tried that fill the box",
       "X,Y,W,H");
   add("--silhouette", options.pictures.silhouette,
       "Image of where the object is, 1, and where it is not, 0, which the render's coverage should match: in "
@@ -287,10 +304,8 @@ void add_bop_options(CLI::App& command, BopOptions& options) {
   };
   add("--bop", options.folder,
       "Folder of a scene of a BOP data set, in place of --scene: camera, picture, model (millimetres) and, "
-      "without "
-      "--search, the start are its files'; the translation is looked for, and P.json or a row of results in "
-      "P.csv is "
-      "written",
+      "without --search, the start are its files'; the translation is looked for, and P.json or a row of "
+      "results in P.csv is written",
       "DATASET/test/000001");
   add("--image", options.image, "Number of the image", "N");
   add("--object", options.object, "Number of the object", "ID");
@@ -322,8 +337,7 @@ void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
   add("--optimizer", options.optimizer, "Optimizer of the steps; adam by default", "adam|sgd");
   add("--schedule", options.schedule,
       "Way the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
-      "anneal by "
-      "default",
+      "anneal by default",
       "anneal|adaptive");
   add("--learning-rate", method.optimizer.learning_rate, "Size of the first steps; 0.05 by default", "FLOAT");
 }
@@ -346,8 +360,9 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
       ->add_option(
           "--mesh", options->meshes,
           "Numbers of the scene's meshes, from 0, that move together as one object: the pose is that of the "
-          "first. The rest stand still as the scene has them, in front of the object or behind it. Needed "
-          "where the scene has several meshes")
+          "first. Given several times, each is an object with a pose of its own. The rest stand still as the "
+          "scene has them, in front of the objects or behind them. Needed where the scene has several meshes")
+      ->allow_extra_args(false)
       ->type_name("N[,N...]");
   add_camera_options(*command, *options);
   CLI::Option* initial =

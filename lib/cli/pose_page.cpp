@@ -4,7 +4,6 @@
 #include <cmath>
 #include <string>
 
-#include "cli/pose_report.hpp"
 #include "cli/text.hpp"
 
 namespace dpr::cli {
@@ -71,25 +70,34 @@ void add_equals(Page& page, const PoseResult& result) {
   page.add_table(rows);
 }
 
-}  // namespace
-
-void write_pose_page(const std::filesystem::path& file, const PageSource& source, const PoseResult& result,
-                     const PosePictures& pictures, const std::optional<glm::dmat3>& truth) {
-  Page page(source);
-  page.add_pictures({pictures.target, pictures.start, pictures.end, pictures.difference});
-  page.add_wipe(pictures.target, pictures.end);
-  page.add_heading("From the start to the end");
+/// A body's way and what was found of it. `suffix`: of the headings.
+void add_body(Page& page, const PoseResult& result, const Picture& target, const BodyPictures& pictures,
+              const std::string& suffix, const std::optional<glm::dmat3>& truth) {
+  page.add_heading("From the start to the end" + suffix);
   page.add_paragraph("Start and end are rendered without smoothing, the iterations as the solver saw them." +
                      search_text(result) + light_text(result));
   std::vector<std::vector<Picture>> rows;
   for (const Picture& frame : pictures.frames) rows.push_back({frame});
-  page.add_player({pictures.target}, rows);
-  page.add_heading("Result");
+  page.add_player({target}, rows);
+  page.add_heading("Result" + suffix);
   add_numbers(page, result, truth);
   add_equals(page, result);
-  if (pictures.has_plot) {
-    page.add_heading("Iterations");
-    page.add_plot("plot.png", "loss, rotation and smoothing by iteration");
+  if (pictures.plot.empty()) return;
+  page.add_heading("Iterations" + suffix);
+  page.add_plot(pictures.plot, "loss, rotation and smoothing by iteration");
+}
+
+}  // namespace
+
+void write_pose_page(const std::filesystem::path& file, const PageSource& source,
+                     std::span<const FoundBody> found, const PosePictures& pictures,
+                     const std::optional<glm::dmat3>& truth) {
+  Page page(source);
+  page.add_pictures({pictures.target, pictures.start, pictures.end, pictures.difference});
+  page.add_wipe(pictures.target, pictures.end);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const std::string suffix = suffix_of(found[i], found.size());
+    add_body(page, found[i].result, pictures.target, pictures.bodies[i], suffix, truth);
   }
   page.write(file);
 }

@@ -3,22 +3,30 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "cli/page.hpp"
-#include "dpr/pose.hpp"
+#include "cli/pose_report.hpp"
 
 namespace dpr::cli {
+
+/// Pictures of a body's way.
+struct BodyPictures {
+  std::vector<Picture> frames;  ///< the start and iterations
+  std::string plot;             ///< file; empty: none
+};
 
 /// The pictures that write_pose_report() left.
 struct PosePictures {
   Picture target, start, end, difference;
-  std::vector<Picture> frames;  ///< the start and iterations
-  bool has_plot = false;
+  std::vector<BodyPictures> bodies;
 };
 
 /// One HTML file that refers to the pictures beside it. Throws IoError.
-void write_pose_page(const std::filesystem::path& file, const PageSource& source, const PoseResult& result,
-                     const PosePictures& pictures, const std::optional<glm::dmat3>& truth);
+void write_pose_page(const std::filesystem::path& file, const PageSource& source,
+                     std::span<const FoundBody> found, const PosePictures& pictures,
+                     const std::optional<glm::dmat3>& truth);
 
 }  // namespace dpr::cli

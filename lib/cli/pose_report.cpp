@@ -26,9 +26,9 @@ constexpr std::size_t k_strip_length = 12;  // the start among them
 /// Renders the scene with its body in any pose, in a light that was found.
 class PoseCamera {
  public:
-  PoseCamera(const Device& device, Scene scene, const PoseBody& body, const FoundLight& light)
+  PoseCamera(const Device& device, Scene scene, const FoundBody& found, const FoundLight& light)
       : renderer_(device),
-        body_(body),
+        body_(scene, found.meshes),
         camera_(scene.camera),
         background_(scene.background),
         gain_(light.gain) {
@@ -61,7 +61,7 @@ class PoseCamera {
   }
 
   Renderer renderer_;
-  const PoseBody& body_;
+  PoseBody body_;
   Camera camera_;
   glm::vec3 background_;
   std::optional<ColorGain> gain_;
@@ -141,6 +141,15 @@ Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3
   return entry;
 }
 
+/// The scene with all bodies but one where they were found.
+Scene with_others(const Scene& scene, std::span<const FoundBody> found, const FoundBody* one = nullptr) {
+  Scene result = scene;
+  for (const FoundBody& body : found) {
+    if (&body != one) PoseBody(scene, body.meshes).place(result, body.result.pose);
+  }
+  return result;
+}
+
 }  // namespace
 
 std::span<const std::string_view> light_names() {
@@ -161,11 +170,18 @@ std::string doubt_text(const PoseResult& result) {
                 result.doubt == PoseDoubt::empty_picture ? "a picture without the object" : "wrong poses");
 }
 
+std::string suffix_of(const FoundBody& body, std::size_t bodies) {
+  if (bodies == 1) return "";
+  std::string text;
+  for (const std::size_t mesh : body.meshes) text += (text.empty() ? "" : ", ") + std::to_string(mesh);
+  return (body.meshes.size() > 1 ? ", meshes " : ", mesh ") + text;
+}
+
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
   const auto progress = std::make_shared<Progress>(iterations, quiet, "step", "of at most");
-  return [progress, iterations](const PoseIteration& step) {
+  return [progress, iterations, done = 0U](const PoseIteration& step) mutable {
     const std::string restart = step.descent > 0 ? format("restart %u  ", step.descent) : "";
-    progress->update(step.iteration % iterations + 1,
+    progress->update(done++ % iterations + 1,
                      restart + format("%dx%d  poses tried: %u  loss %.4e", step.width, step.height,
                                       step.hypotheses, step.loss));
     return true;
@@ -202,8 +218,10 @@ Json covariance_to_json(const std::vector<double>& covariance) {
   return rows;
 }
 
-Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& result,
-                  const std::optional<glm::dmat3>& truth) {
+/// The whole of pose.json for an only body; one of its `bodies` for several.
+Json pose_to_json(const Scene& scene, const FoundBody& found, const std::optional<glm::dmat3>& truth) {
+  const PoseBody body(scene, found.meshes);
+  const PoseResult& result = found.result;
   Json json = hypothesis_to_json(result, scene, body);
   json["width"] = scene.width;
   json["height"] = scene.height;
@@ -227,21 +245,47 @@ Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& re
   return json;
 }
 
-FoundLight light_of(const Device& device, const Scene& of, const PoseBody& body, const Image& target,
-                    const PoseResult& result, const LeastSquares& method) {
-  if (result.light == PoseLight::fixed) return {};
+namespace {
+
+/// The kind of light that all bodies are seen in: one that is found with any body holds for all.
+PoseLight light_of_all(std::span<const FoundBody> found) {
+  const auto strongest =
+      std::ranges::max_element(found, {}, [](const FoundBody& body) { return body.result.light; });
+  return strongest->result.light;
+}
+
+}  // namespace
+
+Json poses_to_json(const Scene& scene, std::span<const FoundBody> found,
+                   const std::optional<glm::dmat3>& truth) {
+  if (found.size() == 1) return pose_to_json(scene, found.front(), truth);
+  Json json{{"width", scene.width}, {"height", scene.height}, {"camera", camera_with_view(scene.camera)}};
+  json["explained"] = std::ranges::all_of(found, [](const FoundBody& body) { return body.result.explained; });
+  json["light"] = name_of(light_of_all(found));
+  Json& bodies = json["bodies"] = Json::array();
+  for (const FoundBody& body : found) {
+    Json own = pose_to_json(scene, body, truth);
+    for (const char* const shared : {"width", "height", "camera", "light"}) own.erase(shared);
+    bodies.push_back(std::move(own));
+  }
+  return json;
+}
+
+FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found, const Image& target,
+                    const LeastSquares& method) {
+  const PoseResult& result = found.front().result;
+  const PoseLight light = light_of_all(found);
+  if (light == PoseLight::fixed) return {};
   constexpr float k_blur_pixels = 0.25F, k_robust_scale = 0.1F;  // of a robust fit that leaves it open
-  Scene scene = of;
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(scene.width, scene.height));  // NDC
-  const std::vector<glm::mat4> transforms = body.transforms(result.pose);
-  for (std::size_t i = 0; i < transforms.size(); ++i) scene.meshes[i].transform = transforms[i];
+  scene = with_others(scene, found);
   scene.smoothing = Smoothing();
   scene.smoothing.sigma = blur * blur;
   scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
   const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
   const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
   const float scale = method.robust ? open_scale : 0;
-  if (result.light == PoseLight::gain) return {find_gain(device, scene, view, scale), {}};
+  if (light == PoseLight::gain) return {find_gain(device, scene, view, scale), {}};
   return {{}, find_light(device, scene, {&view, 1}, scale)};
 }
 
@@ -254,25 +298,37 @@ void add_light(Json& json, const FoundLight& light) {
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, const PoseBody& body, const Image& target,
-                       const PoseResult& result, const FoundLight& light, bool quiet,
-                       const std::optional<glm::dmat3>& truth) {
+                       const Scene& scene, std::span<const FoundBody> found, const Image& target,
+                       const FoundLight& light, bool quiet, const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
-  PoseCamera camera(device, scene, body, light);
-  const Image start = camera.render_start(result);
-  const Image end = camera.render(result, rigid_smoothing());
-  const Differences difference = differences({end}, {target});
-  PosePictures pictures{
-      write_picture(folder / "target.png", target, "target"),
-      write_picture(folder / "start.png", start, "start" + angle_text(result.start, truth)),
+  PosePictures pictures;
+  pictures.target = write_picture(folder / "target.png", target, "target");
+  Image end;
+  unsigned iterations = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const PoseResult& result = found[i].result;
+    const std::string number = found.size() > 1 ? "_" + std::to_string(i) : "";
+    PoseCamera camera(device, with_others(scene, found, &found[i]), found[i], light);
+    end = camera.render(result, rigid_smoothing());
+    iterations += result.iterations;
+    BodyPictures& body = pictures.bodies.emplace_back();
+    body.frames = write_frames(folder / ("iterations" + number + ".png"), camera, result, truth);
+    body.plot = "plot" + number + ".png";
+    if (!plot_history(folder / body.plot, result.history, result.start.rotation, truth)) {
+      if (!quiet) std::printf("%s is left out: gnuplot is not installed\n", body.plot.c_str());
+      body.plot.clear();
+    }
+  }
+  const PoseResult& first = found.front().result;
+  const Image start = PoseCamera(device, scene, found.front(), light).render_start(first);
+  pictures.start = write_picture(folder / "start.png", start, "start" + angle_text(first.start, truth));
+  pictures.end =
       write_picture(folder / "end.png", end,
-                    format("end, after %u iterations", result.iterations) + angle_text(result.pose, truth)),
-      write_picture(folder / "difference.png", difference.images.front(),
-                    difference.caption() + ": end and target"),
-      write_frames(folder / "iterations.png", camera, result, truth)};
-  pictures.has_plot = plot_history(folder / "plot.png", result.history, result.start.rotation, truth);
-  if (!pictures.has_plot && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
-  write_pose_page(folder / "index.html", source, result, pictures, truth);
+                    format("end, after %u iterations", iterations) + angle_text(first.pose, truth));
+  const Differences difference = differences({end}, {target});
+  pictures.difference = write_picture(folder / "difference.png", difference.images.front(),
+                                      difference.caption() + ": end and target");
+  write_pose_page(folder / "index.html", source, found, pictures, truth);
 }
 
 }  // namespace dpr::cli

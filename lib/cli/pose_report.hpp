@@ -24,6 +24,14 @@ std::string name_of(PoseLight light);
 std::string name_of(PoseDoubt doubt);
 std::string doubt_text(const PoseResult& result);
 
+/// A body of the scene, and what was found of its pose.
+struct FoundBody {
+  std::vector<std::size_t> meshes;
+  PoseResult result;
+};
+/// ", meshes 1, 2", to tell one of several bodies from the others; empty for an only one.
+std::string suffix_of(const FoundBody& body, std::size_t bodies);
+
 /// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
 /// must not outlive the returned object's copies.
 PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
@@ -32,26 +40,27 @@ PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
 Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene, const PoseBody& body);
 /// A list of rows.
 Json covariance_to_json(const std::vector<double>& covariance);
-/// pose.json, of a fit to a body of the scene. With the true rotation, the angle errors too.
-Json pose_to_json(const Scene& scene, const PoseBody& body, const PoseResult& result,
-                  const std::optional<glm::dmat3>& truth = {});
+/// pose.json, without the light that was found. With the true rotation, the angle errors too.
+Json poses_to_json(const Scene& scene, std::span<const FoundBody> found,
+                   const std::optional<glm::dmat3>& truth = {});
 
 /// A light that was found along with a pose, by find_gain() or find_light(); neither: the scene's own.
 struct FoundLight {
   std::optional<ColorGain> gain;
   std::optional<Lights> lights;
 };
-FoundLight light_of(const Device& device, const Scene& scene, const PoseBody& body, const Image& target,
-                    const PoseResult& result, const LeastSquares& method);
+/// One for all bodies.
+FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found, const Image& target,
+                    const LeastSquares& method);
 /// Adds it to pose.json.
 void add_light(Json& json, const FoundLight& light);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
-/// them, all in that light. Throws IoError.
+/// them, all in that light. Several bodies have iterations_0.png, plot_0.png and so on, which show a body's way with
+/// the others where they were found. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, const PoseBody& body, const Image& target,
-                       const PoseResult& result, const FoundLight& light, bool quiet,
-                       const std::optional<glm::dmat3>& truth = {});
+                       const Scene& scene, std::span<const FoundBody> found, const Image& target,
+                       const FoundLight& light, bool quiet, const std::optional<glm::dmat3>& truth = {});
 
 }  // namespace dpr::cli

@@ -114,7 +114,9 @@ PoseResult PoseSolver::solve(std::span<const Pose> initial, const Callback& call
     require_rotation(pose.rotation);
     poses.push_back({polar_decomposition(pose.rotation).rotation, pose.translation});
   }
-  return timed([&] { return fit_pose(device_, scene_, target_, options_, poses, false, callback).result; });
+  return timed([&] {
+    return fit_pose(device_, scene_, target_, options_, poses, Foreknowledge::start, callback).result;
+  });
 }
 
 PoseResult PoseSolver::search(const Callback& callback) const {
@@ -122,7 +124,8 @@ PoseResult PoseSolver::search(const Callback& callback) const {
   require(method.rotations > 0, "rotations (pose search)", method.rotations, "at least 1");
   const Pose pose = scene_pose();
   return timed([&] {
-    return fit_pose(device_, scene_, target_, options_, std::span(&pose, 1), true, callback).result;
+    return fit_pose(device_, scene_, target_, options_, std::span(&pose, 1), Foreknowledge::place, callback)
+        .result;
   });
 }
 

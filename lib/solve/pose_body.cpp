@@ -20,11 +20,22 @@ PoseBody::PoseBody(const Scene& scene, std::span<const std::size_t> meshes) {
   }
 }
 
+namespace {
+
+glm::mat4 part_transform(const BodyPart& part, const Pose& pose) {
+  return affine(pose.rotation * part.linear, pose.translation + pose.rotation * part.offset);
+}
+
+}  // namespace
+
 std::vector<glm::mat4> PoseBody::transforms(const Pose& pose) const {
   std::vector<glm::mat4> result = transforms_;
-  for (const BodyPart& part : parts_)
-    result[part.mesh] = affine(pose.rotation * part.linear, pose.translation + pose.rotation * part.offset);
+  for (const BodyPart& part : parts_) result[part.mesh] = part_transform(part, pose);
   return result;
+}
+
+void PoseBody::place(Scene& scene, const Pose& pose) const {
+  for (const BodyPart& part : parts_) scene.meshes[part.mesh].transform = part_transform(part, pose);
 }
 
 std::vector<PoseGradient> PoseBody::turning(const Pose& pose, const glm::dvec3& axis) const {

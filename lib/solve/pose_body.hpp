@@ -12,6 +12,9 @@
 
 namespace dpr {
 
+/// At most: rounds in which several bodies are found; fits of each body, two in the second round, in two lights.
+inline constexpr unsigned k_most_rounds = 8, k_most_fits = 2 * (k_most_rounds + 1);
+
 /// A mesh of a body: a point p of it is R (linear p + offset) + t in the world where the body's pose is R, t.
 struct BodyPart {
   std::size_t mesh;  ///< entry of Scene::meshes
@@ -35,6 +38,8 @@ class PoseBody {
   const Pose& pose() const { return pose_; }
   /// Object to world of all meshes of the scene where the body has a pose.
   std::vector<glm::mat4> transforms(const Pose& pose) const;
+  /// Moves the body in a scene of the same meshes.
+  void place(Scene& scene, const Pose& pose) const;
   /// Derivatives of these by a turn about an axis of the world, and by a shift.
   std::vector<PoseGradient> turning(const Pose& pose, const glm::dvec3& axis) const;
   std::vector<PoseGradient> shifting(const glm::dvec3& shift) const;

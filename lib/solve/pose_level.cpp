@@ -38,12 +38,20 @@ Scene shapes_alone(Scene scene) {
   return scene;
 }
 
-/// Each mesh coloured by its normals in the body's axes. Those that stand still have none, as directions of light turn
-/// with the body: they are seen in the mean light.
-Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals normals) {
+/// Each mesh coloured by its normals in the body's axes. Directions of light turn with the body: meshes that stand
+/// still have normals only where the body's rotation is nearly known, and else are seen in the mean light.
+Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals normals,
+                   const std::optional<glm::dmat3>& rotation) {
   Scene result = scene;
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i)
-    result.meshes[i] = {shape_of(mesh_of(scene, i)), scene.meshes[i].transform};
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Mesh& mesh = mesh_of(scene, i);
+    const glm::mat4& transform = scene.meshes[i].transform;
+    result.meshes[i] = {shape_of(mesh), transform};
+    if (rotation) {
+      result.meshes[i].mesh =
+          colored_by_normals(mesh, glm::transpose(*rotation) * glm::dmat3(transform), normals);
+    }
+  }
   for (const BodyPart& part : body.parts())
     result.meshes[part.mesh].mesh = colored_by_normals(mesh_of(scene, part.mesh), part.linear, normals);
   return result;
@@ -68,7 +76,7 @@ glm::vec3 rgb(const cl_float4& color) { return {color.s[0], color.s[1], color.s[
 
 PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& target,
                      const LeastSquares& options, const PoseSpace& space, const LevelShape& shape,
-                     PoseLight light, CornerNormals normals)
+                     PoseLight light, CornerNormals normals, const std::optional<glm::dmat3>& rotation)
     : space_(space),
       samples_(shape.samples),
       is_finest_(shape.short_side == std::min(scene.width, scene.height)),
@@ -84,7 +92,7 @@ PoseLevel::PoseLevel(const Device& device, const Scene& scene, const Image& targ
   scene_ = subdivide_for_lens(whole, {}, lenses).scene;
   colors_.renderer.set_scene(scene_);
   if (light == PoseLight::harmonics) {
-    show(normals_.emplace(Images{Renderer(device)}), with_normals(whole, space.body(), normals));
+    show(normals_.emplace(Images{Renderer(device)}), with_normals(whole, space.body(), normals, rotation));
   }
   if (!options.depth.image.pixels.empty())
     show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));

@@ -20,9 +20,11 @@ namespace dpr {
 
 class PoseLevel {
  public:
-  /// An empty target: colours do not count.
+  /// An empty target: colours do not count. `rotation`: the body's, where it is nearly known; light then has its
+  /// directions at meshes that stand still too, instead of its mean.
   PoseLevel(const Device& device, const Scene& scene, const Image& target, const LeastSquares& options,
-            const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals);
+            const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals,
+            const std::optional<glm::dmat3>& rotation = {});
 
   /// Another target of the same size, where colours count. Nothing is allocated on the device.
   void set_target(const Image& target);

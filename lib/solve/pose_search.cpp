@@ -25,7 +25,7 @@ constexpr std::size_t k_wrong = 15;
 class Fit {
  public:
   Fit(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-      std::span<const Pose> initial, const PosePlaces& places, bool anywhere,
+      std::span<const Pose> initial, const PosePlaces& places, Foreknowledge known,
       const PoseSolver::Callback& callback)
       : device_(device),
         scene_(scene),
@@ -34,7 +34,8 @@ class Fit {
         method_(std::get<LeastSquares>(options.method)),
         light_wanted_(target.pixels.empty() ? PoseLight::fixed : method_.light),
         callback_(callback),
-        anywhere_(anywhere),
+        anywhere_(known == Foreknowledge::place),
+        is_near_(known == Foreknowledge::pose),
         beam_(beam_of(method_)),
         initial_(initial.begin(), initial.end()),
         places_(places),
@@ -77,7 +78,7 @@ class Fit {
   const LeastSquares& method_;
   PoseLight light_wanted_;  // fixed of a target without colours
   const PoseSolver::Callback& callback_;
-  bool anywhere_;  // the first initial pose is as good as any
+  bool anywhere_, is_near_;  // the first initial pose is as good as any; it is nearly right
   const Beam& beam_;
   std::vector<Pose> initial_;
   const PosePlaces& places_;
@@ -162,7 +163,9 @@ void Fit::try_half_turns(PoseLevel& level) {
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
-  return PoseLevel(device_, scene_, target_, method_, space_, shape, light, normals_);
+  const std::optional<glm::dmat3> rotation =
+      is_near_ ? std::optional(initial_.front().rotation) : std::nullopt;
+  return PoseLevel(device_, scene_, target_, method_, space_, shape, light, normals_, rotation);
 }
 
 /// True if a further search in the scene's own light is in vain. A robust loss cannot tell.
@@ -286,7 +289,7 @@ void Fit::choose_equals() {
 }
 
 FittedPose fit_about_middle(const Device& device, const Scene& scene, const Image& target,
-                            const PoseOptions& options, std::span<const Pose> initial, bool anywhere,
+                            const PoseOptions& options, std::span<const Pose> initial, Foreknowledge known,
                             const PoseSolver::Callback& callback) {
   const PosePivot pivot(scene, options);
   std::vector<Pose> starts;
@@ -298,9 +301,10 @@ FittedPose fit_about_middle(const Device& device, const Scene& scene, const Imag
       return callback(step);
     };
   }
+  const bool anywhere = known == Foreknowledge::place;
   const PosePlaces places(pivot.scene(), options, starts.front(), anywhere);
   if (anywhere) starts = {places.about()};
-  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, anywhere, report).run();
+  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, known, report).run();
   PoseResult& result = fitted.result;
   pivot.to_origin(result.pose, result.covariance);
   result.pose = pivot.to_origin(result.pose);
@@ -313,12 +317,13 @@ FittedPose fit_about_middle(const Device& device, const Scene& scene, const Imag
 }  // namespace
 
 FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-                    std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback) {
-  if (const std::optional<PoseBox> box = box_of_search(options, anywhere)) {
+                    std::span<const Pose> initial, Foreknowledge known,
+                    const PoseSolver::Callback& callback) {
+  if (const std::optional<PoseBox> box = box_of_search(options, known == Foreknowledge::place)) {
     const PoseProblem part = cut_to_box(scene, target, options, *box);
-    return fit_about_middle(device, part.scene, part.target, part.options, initial, anywhere, callback);
+    return fit_about_middle(device, part.scene, part.target, part.options, initial, known, callback);
   }
-  return fit_about_middle(device, scene, target, options, initial, anywhere, callback);
+  return fit_about_middle(device, scene, target, options, initial, known, callback);
 }
 
 }  // namespace dpr

@@ -17,10 +17,15 @@ struct FittedPose {
       1;  ///< least loss of what explains nothing, in parts of that of a picture without object
 };
 
-/// From the initial poses and the options' rotations together. Of equally good poses the one nearest to the
-/// first initial pose is the result; with `anywhere`, the one of the smallest loss, and the initial pose only
-/// gives the translation.
+/// Knowledge of the pose before a fit.
+enum class Foreknowledge {
+  place,  ///< the first initial pose gives the translation alone; the pose of the smallest loss is the result
+  start,  ///< the result is the nearest to the first initial pose of those that are equally good
+  pose  ///< the same; the rotation is nearly right, so that light has directions at meshes that stand still too
+};
+
+/// Fits from the initial poses and the options' rotations together.
 FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-                    std::span<const Pose> initial, bool anywhere, const PoseSolver::Callback& callback);
+                    std::span<const Pose> initial, Foreknowledge known, const PoseSolver::Callback& callback);
 
 }  // namespace dpr

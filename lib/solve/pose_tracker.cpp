@@ -134,7 +134,8 @@ TrackedPose PoseTracker::Impl::first(const Image& frame) {
   const bool anywhere = (options.search || misses > 0) && is_due();
   PoseOptions single = pose_options(options);
   if (!anywhere) std::get<LeastSquares>(single.method).rotations = 0;
-  FittedPose fitted = fit_pose(device, pivot.scene(), frame, single, {&start, 1}, anywhere, {});
+  const Foreknowledge known = anywhere ? Foreknowledge::place : Foreknowledge::start;
+  FittedPose fitted = fit_pose(device, pivot.scene(), frame, single, {&start, 1}, known, {});
   if (!fitted.result.explained) {
     ++misses;
     return {.pose = pivot.to_origin(start), .loss = fitted.result.loss};

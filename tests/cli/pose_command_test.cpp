@@ -79,12 +79,77 @@ TEST_SUITE("pipeline") {
     REQUIRE(pose["transforms"].size() == 1);
     CHECK(pose["transforms"][0] == pose["transform"]);
     for (const char* wrong :
-         {"--mesh 2", "--mesh 1,1", "--mesh -1", "--mesh cube", "--mesh ,", "--mesh 0 --mesh 1"}) {
+         {"--mesh 2", "--mesh 1,1", "--mesh -1", "--mesh cube", "--mesh ,", "--mesh 0,1 --mesh 1",
+          "--mesh 0 --mesh 2", "--mesh 0 --mesh ,", "--mesh 0 --mesh 1 --initial-rotation 0,1,0"}) {
       CAPTURE(wrong);
       const Outcome outcome = run_line(folder, line + wrong);
       CHECK(outcome.status != 0);
       CHECK(dpr::test::is_error_line(outcome.err));
       CHECK(contains(outcome.err, "--mesh"));
+    }
+  }
+
+  TEST_CASE("dpr pose --mesh --mesh: two objects that hide each other have poses of their own") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto write_scene = [&](const char* file, const json& block) {
+      json scene = json::parse(folder.read(file));
+      scene["meshes"].push_back({{"file", "cube.ply"}, {"transform", block}});
+      folder.write(file, scene.dump());
+    };
+    write_scene("truth.json", {{0.4, 0, 0, 0.9}, {0, 0.6, 0, 0.6}, {0, 0, 0.4, 2.2}, {0, 0, 0, 1}});
+    write_scene("scene.json",
+                {{0.392, 0, 0.0795, 0.85}, {0, 0.6, 0, 0.7}, {-0.0795, 0, 0.392, 2.1}, {0, 0, 0, 1}});
+    json turned = json::parse(folder.read("scene.json"));
+    turned["meshes"][0]["transform"] = {
+        {0.825, 0, 0.565, 0.1}, {0, 1, 0, 0}, {-0.565, 0, 0.825, 0}, {0, 0, 0, 1}};
+    folder.write("scene.json", turned.dump());
+    REQUIRE(run_line(folder, "render --scene truth.json --preset rigid -o target.exr --quiet").status == 0);
+    const std::string line =
+        "pose --scene scene.json --target target.exr --translation --rotations 0 -o pose.json ";
+    const Outcome solved = run_line(folder, line + "--mesh 1 --mesh 0 --report report");
+    CAPTURE(solved.err);
+    REQUIRE(solved.status == 0);
+    CHECK(contains(solved.out, "pose.json, mesh 1: loss"));
+    const json pose = json::parse(folder.read("pose.json"));
+    CHECK(pose["explained"] == true);
+    CHECK(pose["light"] == "fixed");
+    CHECK(pose["width"] == 64);
+    CHECK(pose.contains("camera"));
+    REQUIRE(pose["bodies"].size() == 2);
+    const json &block = pose["bodies"][0], &cube = pose["bodies"][1];
+    check_is_truth(cube);
+    CHECK(block["meshes"] == json{1});
+    CHECK(block["transforms"][0] == block["transform"]);
+    CHECK(std::abs(block["transform"][0][3].get<double>() - 0.9) < 0.03);
+    CHECK(std::abs(block["transform"][1][3].get<double>() - 0.6) < 0.03);
+    for (const char* key :
+         {"explained", "unexplained_part", "loss", "iterations", "seconds", "history", "hypotheses"})
+      CHECK(cube.contains(key));
+    CHECK(cube["covariance"].size() == 6);
+    CHECK_FALSE(cube.contains("camera"));
+    const std::string page = folder.read("report/index.html");
+    for (const char* picture :
+         {"target.png", "start.png", "end.png", "difference.png", "iterations_0.png", "iterations_1.png"})
+      CHECK(contains(page, "src=\"" + std::string(picture) + "\""));
+    CHECK(contains(page, "Result, mesh 0"));
+    const dpr::Image end = dpr::read_image(folder / "report/end.png");
+    const dpr::Image start = dpr::read_image(folder / "report/start.png");
+    const dpr::Image target = dpr::read_image(folder / "report/target.png");
+    double from_end = 0, from_start = 0;
+    for (std::size_t i = 0; i < target.pixels.size(); ++i) {
+      from_end += static_cast<double>(glm::length(glm::vec3(end.pixels[i] - target.pixels[i])));
+      from_start += static_cast<double>(glm::length(glm::vec3(start.pixels[i] - target.pixels[i])));
+    }
+    CHECK(from_end < 0.2 * from_start);
+    for (const char* wrong :
+         {"--focal", "--distortion", "--box 1,1,20,20", "--silhouette target.exr", "--method descent"}) {
+      CAPTURE(wrong);
+      const Outcome outcome = run_line(folder, line + "--mesh 0 --mesh 1 --quiet " + wrong);
+      CHECK(outcome.status == 1);
+      CHECK(dpr::test::is_error_line(outcome.err));
+      CHECK(contains(outcome.err, std::string(wrong).substr(0, std::string(wrong).find(' '))));
     }
   }
 
