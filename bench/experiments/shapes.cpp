@@ -15,6 +15,7 @@
 #include "dpr/voxels.hpp"
 #include "experiment.hpp"
 #include "mesh/bounding_box.hpp"
+#include "mesh/isosurface.hpp"
 #include "views.hpp"
 
 namespace dpr::experiments {
@@ -36,6 +37,48 @@ Mesh make_blob() {
   for (glm::vec3& p : mesh.positions)
     p *= 1 + 0.25F * std::sin(3 * p.x + 1) * std::cos(4 * p.y) + 0.15F * std::sin(5 * p.z);
   return mesh;
+}
+
+/// The part of a field from the surface of a box inwards.
+float in_box(const glm::vec3& p, const glm::vec3& centre, const glm::vec3& half) {
+  const glm::vec3 beyond = glm::abs(p - centre) - half;
+  return -std::max({beyond.x, beyond.y, beyond.z});
+}
+
+/// A seat on four legs, with a back of two posts and two rails.
+float chair(const glm::vec3& p) {
+  const glm::vec3 side(std::abs(p.x), p.y, p.z);  // it is symmetric
+  return std::max({in_box(side, {0, 0, 0}, {0.5F, 0.06F, 0.5F}),
+                   in_box(side, {0.43F, -0.5F, 0.43F}, {0.07F, 0.5F, 0.07F}),
+                   in_box(side, {0.43F, 0, -0.43F}, {0.07F, 1, 0.07F}),
+                   in_box(side, {0, 0.9F, -0.43F}, {0.5F, 0.1F, 0.05F}),
+                   in_box(side, {0, 0.5F, -0.43F}, {0.5F, 0.07F, 0.05F})});
+}
+
+/// A wall about a hollow, with a handle.
+float mug(const glm::vec3& p) {
+  const float radius = glm::length(glm::vec2(p.x, p.z));
+  const float body = std::min(0.7F - radius, 0.9F - std::abs(p.y));
+  const float hollow = std::min(0.58F - radius, p.y + 0.78F);
+  const float ring = glm::length(glm::vec2(p.x - 0.7F, p.y)) - 0.42F;
+  const float handle = std::min(0.1F - glm::length(glm::vec2(ring, p.z)), radius - 0.64F);
+  return std::max(std::min(body, -hollow), handle);
+}
+
+float torus(const glm::vec3& p) {
+  return 0.3F - glm::length(glm::vec2(glm::length(glm::vec2(p.x, p.y)) - 0.7F, p.z));
+}
+
+Mesh surface_of(float (*field)(const glm::vec3&)) {
+  constexpr int k_cells = 96;
+  constexpr double k_half = 1.3;
+  ScalarGrid grid{glm::ivec3(k_cells + 1), glm::dvec3(-k_half), 2 * k_half / k_cells, {}};
+  for (int z = 0; z <= k_cells; ++z) {
+    for (int y = 0; y <= k_cells; ++y) {
+      for (int x = 0; x <= k_cells; ++x) grid.values.push_back(field(glm::vec3(grid.position({x, y, z}))));
+    }
+  }
+  return isosurface(grid);
 }
 
 void centre(Mesh& mesh) {
@@ -64,13 +107,16 @@ void paint(Mesh& mesh) {
   }
 }
 
-/// Spot and the fish; for a smoke test a shape of our own, which is coarser.
+/// Spot and the fish, and things with holes; for a smoke test a shape of our own, which is coarser.
 std::vector<Shape> make_shapes(bool smoke) {
   const std::filesystem::path folder = DPR_BENCH_DATA;
   std::vector<Shape> shapes;
   if (!smoke) {
     shapes.push_back({"spot", read_mesh(folder / "spot_low.obj")});
     shapes.push_back({"fish", read_mesh(folder / "fish_low.obj")});
+    shapes.push_back({"torus", surface_of(torus)});
+    shapes.push_back({"chair", surface_of(chair)});
+    shapes.push_back({"mug", surface_of(mug)});
   } else {
     shapes.push_back({"blob", make_blob()});
   }
@@ -251,6 +297,7 @@ void run_shapes(const Settings& settings) {
                {{"views", k_views}, {"held_out", k_held_out}, {"voxels", k_voxels}, {"rows", rows}});
   };
   for (Shape& shape : shapes) {
+    write_mesh(settings.folder / (shape.name + ".truth.obj"), shape.mesh);
     Trial& trial = trials.emplace_back(settings, std::move(shape));
     run(trial, methods.front());
     pictures.push_back(trial.picture());

@@ -42,7 +42,10 @@ struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
   vec3 background{0.0F};
   std::vector<ShapeView> views;
-  std::optional<Mesh> initial;         ///< grey without vertex colours; none: an icosphere in the common view
+  /// Grey without vertex colours. None: the surface of all points that no view shows beside the object (the visual hull,
+  /// Laurentini 1994), nor before what depths say, where enough views have alpha to bound it; else an icosphere in the
+  /// common view.
+  std::optional<Mesh> initial;
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
   std::optional<Lights> lights = {};   ///< of all images, world space; none: colours are as they show
 };
@@ -62,9 +65,9 @@ enum class ShapeSteps { large_steps, direct };
 enum class ShapeSchedule { annealed, adaptive };
 
 struct ShapeOptions {
-  unsigned levels = 2;        ///< > 0: of resolution; each has half the pixels of the next on a side
-  unsigned iterations = 160;  ///< > 0: of a level
-  unsigned batch = 6;         ///< > 0: views that an iteration renders, in turn
+  unsigned levels = 2;      ///< > 0: of resolution; each has half the pixels of the next on a side
+  unsigned iterations = 0;  ///< of a level; 0: 100 from a visual hull, which is near, else 160
+  unsigned batch = 6;       ///< > 0: views that an iteration renders, in turn
   /// Number that a device renders together, as MultiDeviceRenderer::set_chunk(). 0: all on one device, a
   /// twelfth on several.
   unsigned chunk = 0;
@@ -137,7 +140,7 @@ class DPR_API ShapeSolver {
   ShapeSolver(Device device, ShapeViews views, ShapeOptions options = {});
   ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOptions options = {});
 
-  /// The mesh that solve() begins with: the initial one with vertex colours, or the icosphere.
+  /// The mesh that solve() begins with, with vertex colours: ShapeViews::initial has which.
   const Mesh& start() const { return start_; }
   /// Most calls of the callback.
   unsigned most_iterations() const;

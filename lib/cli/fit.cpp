@@ -214,7 +214,8 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   };
   add("--levels", solver.levels, "Levels of resolution, each with half the pixels of the next on a side",
       "N");
-  add("--iterations", solver.iterations, "Steps a level", "N");
+  add("--iterations", solver.iterations, "Steps a level; 0: 100 where silhouettes give the start, else 160",
+      "N");
   add("--batch", solver.batch, "Views that a step looks at, in turn", "N");
   add("--chunk", solver.chunk,
       "Views that a device renders together; 0: all of a step on one device, a twelfth on several. The last "
@@ -233,7 +234,7 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
   add("--steps", options.steps, "Motion of vertices: with their neighbours, or each on its own",
       "large|direct");
   add("--lambda", solver.lambda, "Reach over which large steps take neighbours along", "FLOAT");
-  add("--learning-rate", solver.learning_rate, "Size of the steps of vertices, in radii of the first sphere",
+  add("--learning-rate", solver.learning_rate, "Size of the steps of vertices, in radii of the common view",
       "FLOAT");
   add("--learning-rate-end", solver.learning_rate_end,
       "Size of all steps at a level's end over that at its beginning", "FLOAT");
@@ -243,7 +244,7 @@ void add_solver_options(CLI::App& command, FitCommandOptions& options) {
                 "Moves cameras that are a few pixels off, in the second half of each level")
       ->group(k_solver_group);
   add("--camera-learning-rate", solver.camera_learning_rate,
-      "Size of the steps of cameras, in radians and in radii of the first sphere", "FLOAT");
+      "Size of the steps of cameras, in radians and in radii of the common view", "FLOAT");
   add("--rigidity", solver.rigidity,
       "Weight of the mean squared strain against the start; with --remesh-interval 0", "FLOAT");
   add("--checkpoint-interval", solver.checkpoint_interval, "Steps between two checkpoints", "N");
@@ -265,7 +266,7 @@ void add_loss_options(CLI::App& command, ShapeOptions& solver) {
       "Colour difference from which on --robust leaves pixels out");
   add("--ssim", solver.loss.ssim, "1 - structural similarity; the smallest level needs 11x11 pixels");
   add("--depth", solver.depth,
-      "Mean absolute difference of depths, in radii of the first sphere, where views have them");
+      "Mean absolute difference of depths, in radii of the common view, where views have them");
   add("--normal", solver.normal, "Mean absolute difference of normals, where views have them");
   add("--laplacian", solver.regularizers.laplacian,
       "Sum of squared distances of vertices from their neighbours' mean");

@@ -82,6 +82,14 @@ double largest_radius(const Distortion& d) {
   return is_fisheye ? std::tan(largest) : largest;
 }
 
+glm::dvec2 distorted(glm::dvec2 tangents, const Distortion& lens, double largest) {
+  const double radius = glm::length(tangents);
+  if (radius > largest) tangents *= largest / radius;
+  const double radius2 = glm::dot(tangents, tangents);
+  const glm::dvec2 q(lens.p2, -lens.p1);
+  return tangents * (radial_factor(lens, radius2) + 2 * glm::dot(q, tangents)) + q * radius2;
+}
+
 glm::dvec2 undistorted(const glm::dvec2& seen, const std::optional<Distortion>& lens) {
   constexpr int k_steps = 8;
   if (!lens) return seen;

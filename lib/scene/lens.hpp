@@ -15,6 +15,10 @@ bool is_fisheye(const Camera& camera);
 /// largest_radius() too; as kernels/lens.h has it.
 double radial_factor(const Distortion& lens, double radius2);
 
+/// Where a lens shows what is at these tangents from the axis, x right and y up, as kernels/lens.h has it; what is
+/// further from the axis than `largest`, its largest_radius(), is shown there.
+glm::dvec2 distorted(glm::dvec2 tangents, const Distortion& lens, double largest);
+
 /// The tangents at which a lens sees what is seen at these without it, roughly: of Brown's model by a few fixed-point
 /// steps on the radial part, of a fisheye up to 79 degrees from the axis.
 glm::dvec2 undistorted(const glm::dvec2& seen, const std::optional<Distortion>& lens);

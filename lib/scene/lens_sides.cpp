@@ -20,15 +20,6 @@ LensSides::LensSides(const Camera& camera, const glm::mat4& model, int width, in
       largest_radius_(largest_radius(distortion_)),
       visible_radius_(visible_radius(width, height)) {}
 
-/// As kernels/lens.h has it.
-glm::dvec2 LensSides::bend(glm::dvec2 t) const {
-  const double radius = glm::length(t);
-  if (radius > largest_radius_) t *= largest_radius_ / radius;
-  const double radius2 = glm::dot(t, t);
-  const glm::dvec2 q(distortion_.p2, -distortion_.p1);
-  return t * (radial_factor(distortion_, radius2) + 2 * glm::dot(q, t)) + q * radius2;
-}
-
 double LensSides::visible_radius(int width, int height) const {
   constexpr double k_widest = 1e4, k_least = 1e-4, k_step = 0.99;  // tangents
   const glm::dvec2 half = glm::dvec2(width, height) / static_cast<double>(std::min(width, height));
@@ -75,6 +66,9 @@ bool LensSides::may_be_seen(const std::array<glm::dvec3, 3>& corners) const {
 
 /// At three points of it: the difference may be 0 in the middle alone.
 bool LensSides::is_off(const Segment& side) const {
+  const auto bend = [&](const glm::dvec2& tangents) {
+    return distorted(tangents, distortion_, largest_radius_);
+  };
   const glm::dvec2 from = bend(side.from), to = bend(side.to);
   return std::ranges::any_of(std::array{0.25, 0.5, 0.75}, [&](double part) {
     const glm::dvec2 shown = bend(glm::mix(side.from, side.to, part));

@@ -23,7 +23,6 @@ class LensSides {
     glm::dvec2 from, to;  // tangents
   };
 
-  glm::dvec2 bend(glm::dvec2 tangent) const;
   /// A tangent further from the axis than this is shown outside of the image.
   double visible_radius(int width, int height) const;
   /// Clips a side in camera space at the near plane; false if nothing is left.

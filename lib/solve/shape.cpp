@@ -25,6 +25,7 @@
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
+#include "solve/visual_hull.hpp"
 
 namespace dpr {
 namespace {
@@ -56,6 +57,9 @@ OptimizerOptions position_optimizer(const ShapeOptions& options, double radius) 
   return {.kind = large ? OptimizerKind::uniform_adam : OptimizerKind::adam,
           .learning_rate = options.learning_rate * radius};
 }
+
+// Of a level, unless the options say so.
+constexpr unsigned k_iterations = 160, k_iterations_from_hull = 100;
 
 /// One run of the solver.
 class Run {
@@ -265,14 +269,10 @@ class Run {
   ShapeState state_;
 };
 
-/// The mesh to begin with; colours that are not known are grey.
-Mesh make_start(const ShapeViews& views) {
+Mesh make_sphere(const CommonView& common) {
   constexpr unsigned k_subdivisions = 3;
-  const CommonView common = common_view(views);
-  if (views.initial) return with_vertex_colors(*views.initial);
   Mesh sphere = make_icosphere(k_subdivisions, static_cast<float>(common.radius));
   for (glm::vec3& p : sphere.positions) p += glm::vec3(common.centre);
-  sphere.vertex_colors.assign(sphere.positions.size(), glm::vec3(0.5F));
   return sphere;
 }
 
@@ -297,7 +297,12 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
   check_devices(devices_);
   check_shape_views(views_);
   check_shape_options(options_, views_);
-  start_ = make_start(views_);
+  std::optional<Mesh> hull;
+  if (!views_.initial) hull = visual_hull(views_);
+  if (options_.iterations == 0) options_.iterations = hull ? k_iterations_from_hull : k_iterations;
+  start_ = with_vertex_colors(views_.initial ? *views_.initial
+                              : hull         ? *hull
+                                             : make_sphere(common_view(views_)));
   check_mesh_loss(options_.regularizers, start_);
   const ShapeTargets targets(views_, options_, ShapeLevel(views_, options_, 0));
   check_loss(targets.loss(), targets.images);

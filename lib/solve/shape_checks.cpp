@@ -52,8 +52,8 @@ void check_shape_options(const ShapeOptions& o, const ShapeViews& views) {
   const unsigned most = static_cast<unsigned>(std::log2(std::min(views.width, views.height))) + 1;
   require(o.levels > 0 && o.levels <= most, "levels (shape)", o.levels,
           "at least 1, and a pixel a side at the coarsest");
-  require(o.iterations > 0 && o.iterations <= std::numeric_limits<unsigned>::max() / o.levels,
-          "iterations (shape)", o.iterations, "at least 1, and below 2^32 in all levels");
+  require(o.iterations <= std::numeric_limits<unsigned>::max() / o.levels, "iterations (shape)", o.iterations,
+          "below 2^32 in all levels");
   require(o.batch > 0, "batch (shape)", o.batch, "at least 1");
   require(o.checkpoint_interval > 0, "checkpoint_interval (shape)", o.checkpoint_interval, "at least 1");
   require(positive(o.edge_pixels), "edge_pixels (shape)", o.edge_pixels, "a finite number above 0");

@@ -56,7 +56,8 @@ TEST_SUITE("pipeline") {
     if (dpr::test::is_reduced()) return;  // no few pixels and steps show it
     const dpr::Device device = dpr::open_device();
     const Mesh mesh = star();
-    const ShapeViews views = views_of(device, mesh);
+    ShapeViews views = views_of(device, mesh);
+    views.initial = dpr::make_icosphere(3, 0.6F);  // the views' hull has the arms already
     const dpr::Bounds box{glm::vec3(-1.2F), glm::vec3(1.2F)};
     const dpr::VoxelGrid truth = dpr::voxelize(mesh, 48, box);
     const auto found = [&](const ShapeOptions& options) {
