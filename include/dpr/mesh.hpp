@@ -76,11 +76,12 @@ DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 /// InvalidArgument where its content cannot be rendered.
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
-/// Writes OBJ, PLY or GLB, by the extension, through a temporary file that is renamed at the end. GLB takes all
-/// but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the faces. OBJ has no face colours: asking for that is an
-/// error, not a silent loss. PLY colours are bytes, as other programs expect them: clamped to [0, 1] and rounded;
-/// it has no texture coordinates and normals. Of OBJ and PLY textures are no part, see write_texture(). Throws
-/// IoError, and InvalidArgument where the mesh is not valid.
+/// Writes OBJ, PLY or GLB, by the extension, each file through a temporary one that is renamed at the end. GLB takes all
+/// but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the faces.
+/// OBJ has no face colours: asking for that is an error, not a silent loss. Its textures become PNG files beside it
+/// (x.png; x.0.png, x.1.png of several), named by the materials of x.mtl. PLY colours are bytes, as other programs expect
+/// them: clamped to [0, 1] and rounded; it has no texture coordinates, textures and normals. Throws IoError, and
+/// InvalidArgument where the mesh is not valid.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

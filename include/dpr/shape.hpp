@@ -158,4 +158,16 @@ class DPR_API ShapeSolver {
   Mesh start_;
 };
 
+/// Iterations of find_texture().
+inline constexpr unsigned k_texture_iterations = 24;
+
+/// The mesh with a texture in the place of its colours, side x side texels in [0, 1], that explains the views: from the
+/// colours, by Adam on the mean squared difference of all views, whose cameras have to be known. The texture is an atlas
+/// in which two triangles share a square, with texels between them, so that bilinear filtering mixes none; texels that
+/// no view shows keep the colour. Called once an iteration, the callback returns false to stop. Throws InvalidArgument
+/// for views as ShapeSolver does, for a mesh that is not valid, and where the side is too small for 4x4 texels for two
+/// triangles, or above 16384.
+DPR_API Mesh find_texture(std::vector<Device> devices, const ShapeViews& views, const Mesh& mesh, int side,
+                          const std::function<bool(unsigned iteration, double loss)>& callback = {});
+
 }  // namespace dpr

@@ -13,6 +13,7 @@
 #include "cli/commands.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/option_names.hpp"
+#include "cli/progress.hpp"
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "cli/views_file.hpp"
@@ -26,11 +27,13 @@ namespace dpr::cli {
 namespace {
 
 const char* const k_solver_group = "Solver";
+constexpr int k_least_texture = 4, k_largest_texture = 16384;
 const char* const k_loss_group = "Loss (weights)";
 
 struct FitCommandOptions {
   std::string views, initial, output, saved_views, report, checkpoint, steps = "large", schedule = "anneal",
                                                                        light;
+  std::optional<int> texture;  // texels on a side
   ShapeOptions solver;
 };
 
@@ -103,6 +106,14 @@ void check_outputs(const FitCommandOptions& options) {
     throw InvalidArgument("--output (command line)", "\"" + options.output + "\"",
                           "a file .obj, .ply or .glb");
   }
+  if (options.texture && extension == ".ply")
+    throw InvalidArgument("--texture (command line)", "an output .ply, which has none",
+                          "a file .obj or .glb");
+  if (options.texture && (*options.texture < k_least_texture || *options.texture > k_largest_texture)) {
+    throw InvalidArgument("--texture (command line)", checks::text(*options.texture),
+                          "a number of texels from " + std::to_string(k_least_texture) + " to " +
+                              std::to_string(k_largest_texture));
+  }
   require_writable(options.output);
   for (const std::string& file : {options.checkpoint, options.saved_views}) {
     if (!file.empty()) require_writable(file);
@@ -160,6 +171,18 @@ void complete_photographs(const CLI::App& command, FitCommandOptions& options, c
   if (is_light_unknown) views.lights = find_light(device, views, loss.robust > 0 ? loss.robust_scale : 0);
 }
 
+/// The shape with a texture in the place of its colours.
+Mesh textured(const CLI::App& command, const std::vector<Device>& devices, const ShapeViews& views,
+              const Mesh& mesh, int side, const CommonOptions& common) {
+  Progress progress(k_texture_iterations, common.quiet);
+  return with_option_names(command, {{"side", "--texture"}}, [&] {
+    return find_texture(devices, views, mesh, side, [&](unsigned iteration, double loss) {
+      progress.update(iteration + 1, format("texture  loss %.4e", loss));
+      return true;
+    });
+  });
+}
+
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
   check_outputs(options);
   options.solver.steps = parse_steps(options.steps);
@@ -189,8 +212,10 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
     return show(step, mesh);
   };
   const ShapeResult result = solver.solve(watch, options.checkpoint);
-  write_mesh(options.output, result.mesh);
   for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
+  write_mesh(options.output, result.mesh);
+  if (options.texture)
+    write_mesh(options.output, textured(command, devices, views, result.mesh, *options.texture, common));
   if (!options.saved_views.empty()) write_views(options.saved_views, {options.views, text}, views);
   if (report_failed) std::rethrow_exception(report_failed);
   if (report) {
@@ -299,6 +324,10 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
   command->add_option("-o,--output", options->output, "Mesh to write, OBJ, PLY or GLB")
       ->required()
       ->type_name("MESH.obj");
+  command
+      ->add_option("--texture", options->texture,
+                   "Side of a texture, texels, that takes the place of the mesh's colours; OBJ and GLB")
+      ->type_name("SIZE");
   command
       ->add_option("--save-views", options->saved_views,
                    "Views file to write: --views with the cameras that were found or refined")

@@ -7,6 +7,7 @@
 #include "base/output_file.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/notes.hpp"
+#include "image/codec.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/scan_text.hpp"
 
@@ -22,11 +23,40 @@ void append(std::string& text, const glm::vec3& values) {
   for (int i = 0; i < 3; ++i) text += " " + checks::text(values[i]);
 }
 
+/// Name of the material with a texture, in an OBJ's library.
+std::string material_name(std::uint32_t texture) {
+  return texture == k_no_texture ? "plain" : "texture" + std::to_string(texture);
+}
+
+/// Of the PNG file beside an OBJ: image.png, or image.0.png and so on of several.
+std::filesystem::path texture_file(const std::filesystem::path& file, const Mesh& mesh, std::size_t texture) {
+  const std::string number = mesh.textures.size() > 1 ? "." + std::to_string(texture) : "";
+  return std::filesystem::path(file).replace_extension(number + ".png");
+}
+
+std::filesystem::path material_file(const std::filesystem::path& file) {
+  return std::filesystem::path(file).replace_extension(".mtl");
+}
+
+/// Writes an OBJ's library, and the textures beside it.
+void write_obj_materials(const std::filesystem::path& file, const Mesh& mesh) {
+  const std::string colors = "\nKd 1 1 1\nillum 1\n";  // without highlights
+  std::string text = "newmtl " + material_name(k_no_texture) + colors;
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
+    const std::filesystem::path image = texture_file(file, mesh, i);
+    write_whole_file(image, encode_texture(image, mesh.textures[i]));
+    text += "newmtl " + material_name(static_cast<std::uint32_t>(i)) + colors + "map_Kd " +
+            (mesh.textures[i].wrap == Wrap::clamp ? "-clamp on " : "") + image.filename().string() + "\n";
+  }
+  write_whole_file(material_file(file), text);
+}
+
 std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
   if (!mesh.face_colors.empty()) {
     throw IoError(file, "OBJ has no face colours: expected vertex colours, or the extension .ply");
   }
   std::string text;
+  if (!mesh.textures.empty()) text += "mtllib " + material_file(file).filename().string() + "\n";
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     text += "v";
     append(text, mesh.positions[i]);
@@ -41,7 +71,11 @@ std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
     append(text, normal);
     text += '\n';
   }
+  std::optional<std::uint32_t> material;  // of the last face
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[f];
+    if (!mesh.textures.empty() && material != texture) text += "usemtl " + material_name(texture) + "\n";
+    material = texture;
     text += "f";
     for (int i = 0; i < 3; ++i) {
       text += " " + std::to_string(mesh.faces[f][i] + 1);
@@ -117,7 +151,11 @@ void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
     throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj, .ply or .glb");
   }
   validate(mesh, "mesh for " + file.string());
-  if (extension == ".obj") write_whole_file(file, obj_text(file, mesh));
+  if (extension == ".obj") {
+    const std::string text = obj_text(file, mesh);
+    if (!mesh.textures.empty()) write_obj_materials(file, mesh);
+    write_whole_file(file, text);
+  }
   if (extension == ".ply") write_whole_file(file, ply_text(mesh));
   if (extension == ".glb") write_whole_file(file, glb_bytes(file, mesh));
 }
