@@ -196,6 +196,33 @@ TEST_SUITE("pipeline") {
     CHECK(folder.read("mesh.obj") == before);
   }
 
+  TEST_CASE("dpr fit --texture gives the mesh a texture, and keeps the mesh where it cannot") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto outcome = run_command(folder, with(k_short, {"--texture", "160"}));
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    const dpr::Mesh mesh = dpr::read_mesh(folder / "mesh.obj");
+    REQUIRE(mesh.textures.size() == 1);
+    CHECK(mesh.textures[0].width == 160);
+    CHECK(mesh.vertex_colors.empty());
+    std::filesystem::remove(folder / "mesh.obj");
+    const auto small = run_command(folder, with(k_short, {"--texture", "4"}));
+    CHECK(small.status == 1);
+    CHECK(contains(small.err, "--texture (command line): got 4, expected at least"));
+    CHECK(dpr::read_mesh(folder / "mesh.obj").textures.empty());
+    for (const char* const side : {"3", "16385"}) {
+      const auto refused = run_command(folder, with(k_short, {"--texture", side}));
+      CHECK(refused.status == 1);
+      CHECK(contains(refused.err, "from 4 to 16384"));
+    }
+    const auto ply =
+        run_command(folder, {"fit", "--views", "views.json", "-o", "mesh.ply", "--texture", "64"});
+    CHECK(ply.status == 1);
+    CHECK(contains(ply.err, ".obj or .glb"));
+  }
+
   TEST_CASE("dpr fit: an initial mesh, images without alpha, a smoothing, another size, PLY") {
     if (is_skipped()) return;
     const TempDir folder;

@@ -31,7 +31,8 @@ ScalarGrid sampled(int count, double half_side, const std::function<double(const
 }
 
 int winding(const Mesh& mesh) {
-  return dpr::Solid(dpr::make_edges(mesh.faces, mesh.positions.size()), mesh.faces.size()).winding(mesh.positions, mesh.faces);
+  return dpr::Solid(dpr::make_edges(mesh.faces, mesh.positions.size()), mesh.faces.size())
+      .winding(mesh.positions, mesh.faces);
 }
 
 /// Of a closed triangle mesh: two a part, less two a handle.

@@ -132,6 +132,35 @@ TEST_SUITE("unit") {
     check("illum two", "m.mtl:2: expected illum with a finite number");
   }
 
+  TEST_CASE("OBJ: textures become PNG files beside it, and come back") {
+    const TempDir folder;
+    dpr::Mesh mesh = dpr::make_icosphere(0);
+    mesh.vertex_colors.clear();
+    mesh.texcoords = {{0.1F, 0.2F}, {0.9F, 0.3F}, {0.4F, 0.8F}};
+    mesh.face_texcoords.assign(mesh.faces.size(), glm::uvec3(0, 1, 2));
+    mesh.textures = {{2, 1, {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)}, dpr::Wrap::clamp}};
+    SUBCASE("one") {}
+    SUBCASE("several, and faces without") {
+      mesh.textures.push_back({1, 1, {glm::vec3(0, 0, 1)}});
+      for (std::uint32_t f = 0; f < mesh.faces.size(); ++f)
+        mesh.face_textures.push_back(f % 3 == 2 ? dpr::k_no_texture : f % 3);
+    }
+    dpr::write_mesh(folder / "ball.obj", mesh);
+    const dpr::Mesh read = dpr::read_mesh(folder / "ball.obj");
+    CHECK(read.positions == mesh.positions);
+    CHECK(read.faces == mesh.faces);
+    CHECK(read.face_texcoords == mesh.face_texcoords);
+    CHECK(read.face_textures == mesh.face_textures);
+    REQUIRE(read.textures.size() == mesh.textures.size());
+    for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
+      CHECK(read.textures[i].texels == mesh.textures[i].texels);
+      CHECK(read.textures[i].wrap == mesh.textures[i].wrap);
+    }
+    const bool is_one = mesh.textures.size() == 1;
+    CHECK(std::filesystem::exists(folder / (is_one ? "ball.png" : "ball.1.png")));
+    CHECK(std::filesystem::exists(folder / "ball.mtl"));
+  }
+
   TEST_CASE("OBJ: normals of corners, written and read back") {
     const TempDir folder;
     const std::string normals = "vn 0 0 1\nvn 0.6 0 0.8\nvn 0 0 2.5\n", texcoords = "vt 0 0\nvt 1 1\n";

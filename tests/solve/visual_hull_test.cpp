@@ -1,4 +1,4 @@
-// Shapes that silhouettes bound, and what a fit makes of them.
+// Shapes that silhouettes bound, what a fit makes of them, and their textures.
 #include "solve/visual_hull.hpp"
 
 #include <doctest/doctest.h>
@@ -110,7 +110,35 @@ TEST_SUITE("pipeline") {
     }
     const Mesh hollow = dpr::visual_hull(views).value();
     CHECK(overlap(full, bowl) < 0.75);
-    if (!dpr::test::is_reduced()) CHECK(overlap(hollow, bowl) > 0.8);  // 0.84 of the cells, a third of which lie at the surface
+    if (!dpr::test::is_reduced())
+      CHECK(overlap(hollow, bowl) > 0.8);  // 0.84 of the cells, a third of which lie at the surface
+  }
+
+  TEST_CASE("a texture shows what a shape's vertices are too far apart for") {
+    Mesh ball = dpr::make_icosphere(4);
+    for (std::size_t i = 0; i < ball.positions.size(); ++i)
+      ball.vertex_colors[i] = glm::vec3(std::sin(12 * ball.positions[i].x) > 0 ? 0.9F : 0.1F);
+    const ShapeViews views = views_of(ball, reduced(8, 2));
+    Mesh coarse = dpr::make_icosphere(2);
+    coarse.vertex_colors.assign(coarse.positions.size(), glm::vec3(0.5F));
+    std::vector<double> losses;
+    const auto find = [&](const ShapeViews& seen) {
+      return dpr::find_texture({dpr::open_device()}, seen, coarse, 128, [&](unsigned, double loss) {
+        losses.push_back(loss);
+        return !dpr::test::is_reduced() || losses.size() < 2;
+      });
+    };
+    const Mesh painted = find(views);
+    CHECK(painted.positions == coarse.positions);
+    CHECK(painted.vertex_colors.empty());
+    REQUIRE(painted.textures.size() == 1);
+    for (const glm::vec3& texel : painted.textures[0].texels)
+      REQUIRE((texel.x >= 0 && texel.x <= 1 && texel.y >= 0 && texel.y <= 1));
+    CHECK(losses.back() < losses.front());
+    if (!dpr::test::is_reduced()) CHECK(losses.back() < 0.2 * losses.front());
+    ShapeViews unknown = views;
+    unknown.views[0].knowledge = dpr::CameraKnowledge::unknown;
+    CHECK_THROWS_AS(find(unknown), dpr::InvalidArgument);
   }
 
   TEST_CASE("a fit begins with a ball where silhouettes do not bound a shape") {
