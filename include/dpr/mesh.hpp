@@ -76,11 +76,11 @@ DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 /// InvalidArgument where its content cannot be rendered.
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
-/// Writes OBJ, PLY or GLB, by the extension, each file through a temporary one that is renamed at the end. GLB takes all
-/// but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the faces.
-/// OBJ has no face colours: asking for that is an error, not a silent loss. Its textures become PNG files beside it
-/// (x.png; x.0.png, x.1.png of several), named by the materials of x.mtl. PLY colours are bytes, as other programs expect
-/// them: clamped to [0, 1] and rounded; it has no texture coordinates, textures and normals. Throws IoError, and
+/// Writes OBJ, PLY or GLB, by the extension, each file through a temporary one that is renamed at the end. GLB takes
+/// all but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the
+/// faces. OBJ has no face colours: asking for that is an error, not a silent loss. Its textures become PNG files beside
+/// it (x.png; x.0.png, x.1.png of several), named by the materials of x.mtl. PLY colours are bytes, as other programs
+/// expect them: clamped to [0, 1] and rounded; it has no texture coordinates, textures or normals. Throws IoError, and
 /// InvalidArgument where the mesh is not valid.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 

@@ -42,9 +42,9 @@ struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
   vec3 background{0.0F};
   std::vector<ShapeView> views;
-  /// Grey without vertex colours. None: the surface of all points that no view shows beside the object (the visual hull,
-  /// Laurentini 1994), nor before what depths say, where enough views have alpha to bound it; else an icosphere in the
-  /// common view.
+  /// Grey without vertex colours. None: the surface of all points that no view shows beside the object (the visual
+  /// hull, Laurentini 1994), nor before what depths say, where enough views have alpha to bound it; else an icosphere
+  /// in the common view.
   std::optional<Mesh> initial;
   std::optional<Smoothing> smoothing;  ///< at the finest level's end; none: as ShapeOptions::blur_end has it
   std::optional<Lights> lights = {};   ///< of all images, world space; none: colours are as they show
@@ -162,9 +162,9 @@ class DPR_API ShapeSolver {
 inline constexpr unsigned k_texture_iterations = 24;
 
 /// The mesh with a texture in the place of its colours, side x side texels in [0, 1], that explains the views: from the
-/// colours, by Adam on the mean squared difference of all views, whose cameras have to be known. The texture is an atlas
-/// in which two triangles share a square, with texels between them, so that bilinear filtering mixes none; texels that
-/// no view shows keep the colour. Called once an iteration, the callback returns false to stop. Throws InvalidArgument
+/// colours, by Adam on the mean squared difference of all views, whose cameras have to be known. The texture is an
+/// atlas in which two triangles share a square, with texels between them, so that bilinear filtering mixes none; texels
+/// that no view shows keep the colour. The callback is called once an iteration; false stops. Throws InvalidArgument
 /// for views as ShapeSolver does, for a mesh that is not valid, and where the side is too small for 4x4 texels for two
 /// triangles, or above 16384.
 DPR_API Mesh find_texture(std::vector<Device> devices, const ShapeViews& views, const Mesh& mesh, int side,

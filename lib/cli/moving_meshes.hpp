@@ -10,8 +10,8 @@
 namespace dpr::cli {
 
 /// The numbers of each --mesh, separated by commas; one empty list where none is given, which stands for the scene's
-/// only mesh. Throws InvalidArgument for what is no mesh of the scene, for a mesh that is named twice, and where none is
-/// given in a scene of several meshes.
+/// only mesh. Throws InvalidArgument for what is no mesh of the scene, for a mesh that is named twice, and where none
+/// is given in a scene of several meshes.
 PoseBodies parse_moving_meshes(const std::vector<std::string>& texts, const Scene& scene);
 
 }  // namespace dpr::cli

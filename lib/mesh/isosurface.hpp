@@ -26,8 +26,8 @@ struct ScalarGrid {
 
 /// The surface on which the values are 0, by marching through the six tetrahedra of every cell (Doi & Koide 1991): a
 /// manifold, closed where the values at the grid's border are negative, and wound counter-clockwise as seen from
-/// outside. Vertices keep a tenth of an edge's length from the grid's points, so that no triangle is degenerate. Without
-/// faces where no value is positive. Deterministic; O(points).
+/// outside. Vertices keep a tenth of an edge's length from the grid's points, so that no triangle is degenerate. There
+/// are no faces where no value is positive. Deterministic; O(points).
 Mesh isosurface(const ScalarGrid& grid);
 
 }  // namespace dpr
