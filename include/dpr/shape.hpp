@@ -142,6 +142,8 @@ class DPR_API ShapeSolver {
 
   /// The mesh that solve() begins with, with vertex colours: ShapeViews::initial has which.
   const Mesh& start() const { return start_; }
+  /// True if that is the hull that silhouettes leave. Silhouettes that do not go together leave none.
+  bool begins_with_hull() const { return begins_with_hull_; }
   /// Most calls of the callback.
   unsigned most_iterations() const;
 
@@ -156,13 +158,14 @@ class DPR_API ShapeSolver {
   ShapeViews views_;
   ShapeOptions options_;
   Mesh start_;
+  bool begins_with_hull_ = false;
 };
 
 /// Iterations of find_texture().
-inline constexpr unsigned k_texture_iterations = 24;
+inline constexpr unsigned k_texture_iterations = 10;
 
 /// The mesh with a texture in the place of its colours, side x side texels in [0, 1], that explains the views: from the
-/// colours, by Adam on the mean squared difference of all views, whose cameras have to be known. The texture is an
+/// colours, by ten steps of iterative reconstruction from all views, whose cameras have to be known. The texture is an
 /// atlas in which two triangles share a square, with texels between them, so that bilinear filtering mixes none; texels
 /// that no view shows keep the colour. The callback is called once an iteration; false stops. Throws InvalidArgument
 /// for views as ShapeSolver does, for a mesh that is not valid, and where the side is too small for 4x4 texels for two

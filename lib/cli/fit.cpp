@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/checks.hpp"
+#include "base/clock.hpp"
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "cli/commands.hpp"
@@ -19,6 +20,7 @@
 #include "cli/views_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/photographs.hpp"
+#include "mesh/texture_atlas.hpp"
 #include "scene/scene_json.hpp"
 #include "solve/resample.hpp"
 #include "solve/shape_views.hpp"
@@ -27,7 +29,6 @@ namespace dpr::cli {
 namespace {
 
 const char* const k_solver_group = "Solver";
-constexpr int k_least_texture = 4, k_largest_texture = 16384;
 const char* const k_loss_group = "Loss (weights)";
 
 struct FitCommandOptions {
@@ -109,10 +110,9 @@ void check_outputs(const FitCommandOptions& options) {
   if (options.texture && extension == ".ply")
     throw InvalidArgument("--texture (command line)", "an output .ply, which has none",
                           "a file .obj or .glb");
-  if (options.texture && (*options.texture < k_least_texture || *options.texture > k_largest_texture)) {
+  if (options.texture && (*options.texture < 1 || *options.texture > TextureAtlas::k_most_side)) {
     throw InvalidArgument("--texture (command line)", checks::text(*options.texture),
-                          "a number of texels from " + std::to_string(k_least_texture) + " to " +
-                              std::to_string(k_largest_texture));
+                          "a number of texels from 1 to " + std::to_string(TextureAtlas::k_most_side));
   }
   require_writable(options.output);
   for (const std::string& file : {options.checkpoint, options.saved_views}) {
@@ -171,16 +171,40 @@ void complete_photographs(const CLI::App& command, FitCommandOptions& options, c
   if (is_light_unknown) views.lights = find_light(device, views, loss.robust > 0 ? loss.robust_scale : 0);
 }
 
-/// The shape with a texture in the place of its colours.
-Mesh textured(const CLI::App& command, const std::vector<Device>& devices, const ShapeViews& views,
-              const Mesh& mesh, int side, const CommonOptions& common) {
-  Progress progress(k_texture_iterations, common.quiet);
-  return with_option_names(command, {{"side", "--texture"}}, [&] {
-    return find_texture(devices, views, mesh, side, [&](unsigned iteration, double loss) {
-      progress.update(iteration + 1, format("texture  loss %.4e", loss));
+/// Tells where silhouettes were of no use for the start.
+void tell_of_start(const ShapeSolver& solver, const ShapeViews& views, const CommonOptions& common) {
+  const bool has_silhouettes = std::ranges::any_of(views.views, &ShapeView::has_alpha);
+  if (views.initial || solver.begins_with_hull() || !has_silhouettes) return;
+  print_notes(
+      {"silhouettes and depths bound no shape, so the fit begins with a ball: there are too few, or one of "
+       "them or a "
+       "camera is wrong"},
+      common);
+}
+
+/// Writes the shape with a texture in the place of its colours.
+void write_textured(const FitCommandOptions& options, const std::vector<Device>& devices,
+                    const ShapeViews& views, const Mesh& mesh, const CommonOptions& common) {
+  const auto start = Clock::now();
+  const int side = std::max(*options.texture, TextureAtlas::least_side(mesh.faces.size()));
+  if (side > *options.texture) {
+    print_notes({format("--texture: %d texels a side, the least for %zu triangles", side, mesh.faces.size())},
+                common);
+  }
+  double last = 0;
+  {
+    Progress progress(k_texture_iterations, common.quiet);
+    const auto watch = [&](unsigned iteration, double loss) {
+      last = loss;
+      progress.update(iteration + 1, format("texture  mean squared difference %.4e", loss));
       return true;
-    });
-  });
+    };
+    write_mesh(options.output, find_texture(devices, views, mesh, side, watch));
+  }
+  if (!common.quiet) {
+    std::printf("%s: texture of %dx%d texels, mean squared difference %.4g, %.1f s\n", options.output.c_str(),
+                side, side, last, seconds_since(start));
+  }
 }
 
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
@@ -195,6 +219,7 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   complete_photographs(command, options, devices.front(), views, common);
   const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},
                                                [&] { return ShapeSolver(devices, views, options.solver); });
+  tell_of_start(solver, views, common);
   std::optional<FitReport> report;
   if (!options.report.empty()) report.emplace(options.report, devices, views);
   std::exception_ptr report_failed;  // told once there is a mesh
@@ -214,8 +239,6 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
   const ShapeResult result = solver.solve(watch, options.checkpoint);
   for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
   write_mesh(options.output, result.mesh);
-  if (options.texture)
-    write_mesh(options.output, textured(command, devices, views, result.mesh, *options.texture, common));
   if (!options.saved_views.empty()) write_views(options.saved_views, {options.views, text}, views);
   if (report_failed) std::rethrow_exception(report_failed);
   if (report) {
@@ -227,6 +250,7 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
                 options.output.c_str(), result.mesh.positions.size(), result.mesh.faces.size(),
                 result.history.back().loss, result.history.size(), result.seconds);
   }
+  if (options.texture) write_textured(options, devices, views, result.mesh, common);
 }
 
 void add_solver_options(CLI::App& command, FitCommandOptions& options) {
@@ -326,7 +350,7 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
       ->type_name("MESH.obj");
   command
       ->add_option("--texture", options->texture,
-                   "Side of a texture, texels, that takes the place of the mesh's colours; OBJ and GLB")
+                   "Texels a side of a texture that takes the place of the colours of vertices; OBJ and GLB")
       ->type_name("SIZE");
   command
       ->add_option("--save-views", options->saved_views,

@@ -299,6 +299,7 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
   check_shape_options(options_, views_);
   std::optional<Mesh> hull;
   if (!views_.initial) hull = visual_hull(views_);
+  begins_with_hull_ = hull.has_value();
   if (options_.iterations == 0) options_.iterations = hull ? k_iterations_from_hull : k_iterations;
   start_ = with_vertex_colors(views_.initial ? *views_.initial
                               : hull         ? *hull

@@ -137,7 +137,7 @@ TEST_SUITE("pipeline") {
     CHECK(parts.status == 1);
     CHECK(contains(parts.err, "all outside its camera's range, expected some from znear to zfar, 1 to 8"));
     views["depth_scale"] = 8;
-    CHECK(fit("depth.png", dpr::Image(24, 24, glm::vec4(0.5F, 0.5F, 0.5F, 1))).err.empty());
+    CHECK(!contains(fit("depth.png", dpr::Image(24, 24, glm::vec4(0.5F, 0.5F, 0.5F, 1))).err, "depth.png"));
     views["depth_scale"] = 0;
     CHECK(contains(fit("depth.png", dpr::Image(24, 24, glm::vec4(1))).err, "depth_scale"));
     views.erase("depth_scale");
@@ -196,7 +196,7 @@ TEST_SUITE("pipeline") {
     CHECK(folder.read("mesh.obj") == before);
   }
 
-  TEST_CASE("dpr fit --texture gives the mesh a texture, and keeps the mesh where it cannot") {
+  TEST_CASE("dpr fit --texture gives the mesh a texture, with room for its triangles") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
@@ -207,20 +207,37 @@ TEST_SUITE("pipeline") {
     REQUIRE(mesh.textures.size() == 1);
     CHECK(mesh.textures[0].width == 160);
     CHECK(mesh.vertex_colors.empty());
-    std::filesystem::remove(folder / "mesh.obj");
     const auto small = run_command(folder, with(k_short, {"--texture", "4"}));
-    CHECK(small.status == 1);
-    CHECK(contains(small.err, "--texture (command line): got 4, expected at least"));
-    CHECK(dpr::read_mesh(folder / "mesh.obj").textures.empty());
-    for (const char* const side : {"3", "16385"}) {
+    CHECK(small.status == 0);
+    CHECK(contains(small.err, "texels a side, the least for"));
+    const dpr::Mesh least = dpr::read_mesh(folder / "mesh.obj");
+    REQUIRE(least.textures.size() == 1);
+    CHECK((least.textures[0].width > 4 && least.textures[0].width < 160));
+    for (const char* const side : {"0", "16385"}) {
       const auto refused = run_command(folder, with(k_short, {"--texture", side}));
       CHECK(refused.status == 1);
-      CHECK(contains(refused.err, "from 4 to 16384"));
+      CHECK(contains(refused.err, "from 1 to 16384"));
     }
     const auto ply =
         run_command(folder, {"fit", "--views", "views.json", "-o", "mesh.ply", "--texture", "64"});
     CHECK(ply.status == 1);
     CHECK(contains(ply.err, ".obj or .glb"));
+  }
+
+  TEST_CASE("dpr fit tells of silhouettes that bound no shape") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    const auto notes_of_fit = [&] {
+      const auto outcome = run_command(folder, k_short);
+      CHECK(outcome.status == 0);
+      return outcome.err;
+    };
+    CHECK(!contains(notes_of_fit(), "bound no shape"));
+    views["views"][0]["image"] = "empty.exr";
+    dpr::write_image(folder / "empty.exr", dpr::Image(24, 24));
+    folder.write("views.json", views.dump());
+    CHECK(contains(notes_of_fit(), "silhouettes and depths bound no shape"));
   }
 
   TEST_CASE("dpr fit: an initial mesh, images without alpha, a smoothing, another size, PLY") {
