@@ -120,10 +120,11 @@ ScalarGrid margins(const ShapeViews& views) {
 
 std::optional<Mesh> visual_hull(const ShapeViews& views) {
   constexpr float k_edge_cells = 2;
+  constexpr int k_least_points = 64;  // inside: edges are too long for less
   const ScalarGrid grid = margins(views);
-  if (touches_border(grid)) return {};
+  const auto inside = std::ranges::count_if(grid.values, [](float value) { return value > 0; });
+  if (inside < k_least_points || touches_border(grid)) return {};
   const Mesh surface = isosurface(grid);
-  if (surface.faces.empty()) return {};
   return remesh(surface, k_edge_cells * static_cast<float>(grid.cell));
 }
 
