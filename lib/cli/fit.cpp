@@ -108,7 +108,7 @@ void check_outputs(const FitCommandOptions& options) {
                           "a file .obj, .ply or .glb");
   }
   if (options.texture && extension == ".ply")
-    throw InvalidArgument("--texture (command line)", "an output .ply, which has none",
+    throw InvalidArgument("--texture (command line)", "an output .ply, which holds no texture",
                           "a file .obj or .glb");
   if (options.texture && (*options.texture < 1 || *options.texture > TextureAtlas::k_most_side)) {
     throw InvalidArgument("--texture (command line)", checks::text(*options.texture),
@@ -177,8 +177,7 @@ void tell_of_start(const ShapeSolver& solver, const ShapeViews& views, const Com
   if (views.initial || solver.begins_with_hull() || !has_silhouettes) return;
   print_notes(
       {"silhouettes and depths bound no shape, so the fit begins with a ball: there are too few, or one of "
-       "them or a "
-       "camera is wrong"},
+       "them or a camera is wrong"},
       common);
 }
 
@@ -237,8 +236,8 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
     return show(step, mesh);
   };
   const ShapeResult result = solver.solve(watch, options.checkpoint);
-  for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
   write_mesh(options.output, result.mesh);
+  for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
   if (!options.saved_views.empty()) write_views(options.saved_views, {options.views, text}, views);
   if (report_failed) std::rethrow_exception(report_failed);
   if (report) {

@@ -85,13 +85,14 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
   options.solver.method = options.descent;
 }
 
-/// The poses of all bodies, [body].
-std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& options, const Device& device,
+const char* const k_turn = "--initial-rotation (command line)";
+
+/// The poses of all bodies, [body], from that rotation if there is one.
+std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& options,
+                             const std::optional<glm::dmat3>& rotation, const Device& device,
                              const Scene& scene, const Image& target, const PoseBodies& bodies, bool quiet) {
-  const std::string turn = "--initial-rotation (command line)";
-  const bool is_turned = !options.initial_rotation.empty();
-  if (is_turned && bodies.size() > 1)
-    throw InvalidArgument(turn, "one beside several --mesh", "none, or one --mesh");
+  if (rotation && bodies.size() > 1)
+    throw InvalidArgument(k_turn, "one beside several --mesh", "none, or one --mesh");
   const auto named = [&](const auto& work) {
     return with_option_names(command, {{"iterations", "--level-iterations"}}, work);
   };
@@ -111,7 +112,7 @@ std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& option
   }
   if (options.search) return {{bodies.front(), solver.search(callback)}};
   Pose initial = solver.scene_pose();
-  if (is_turned) initial.rotation = rotation_from_vector(parse_vector(options.initial_rotation, turn));
+  if (rotation) initial.rotation = *rotation;
   return {{bodies.front(), solver.solve(initial, callback)}};
 }
 
@@ -226,6 +227,9 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   // The outputs are checked before the work.
   require_writable(options.output);
   check_scene_options(options);
+  std::optional<glm::dmat3> rotation;
+  if (!options.initial_rotation.empty())
+    rotation = rotation_from_vector(parse_vector(options.initial_rotation, k_turn));
   std::optional<BopImage> bop;
   if (!options.bop.folder.empty()) bop = begin_bop(command, options);
   const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
@@ -236,7 +240,8 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const Image target = observe(std::move(pictures), options);
   const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
   const Device device = open_device(common);
-  const std::vector<FoundBody> found = solve(command, options, device, scene, target, bodies, common.quiet);
+  const std::vector<FoundBody> found =
+      solve(command, options, rotation, device, scene, target, bodies, common.quiet);
   const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
   const bool is_table = writes_csv(options);
   FoundLight light;

@@ -303,13 +303,13 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
   make_folder(folder);
   PosePictures pictures;
   pictures.target = write_picture(folder / "target.png", target, "target");
-  Image end;
+  Image end;  // the same for every body
   unsigned iterations = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const PoseResult& result = found[i].result;
     const std::string number = found.size() > 1 ? "_" + std::to_string(i) : "";
     PoseCamera camera(device, with_others(scene, found, &found[i]), found[i], light);
-    end = camera.render(result, rigid_smoothing());
+    if (i == 0) end = camera.render(result, rigid_smoothing());
     iterations += result.iterations;
     BodyPictures& body = pictures.bodies.emplace_back();
     body.frames = write_frames(folder / ("iterations" + number + ".png"), camera, result, truth);

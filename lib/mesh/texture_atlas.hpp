@@ -26,8 +26,8 @@ class TextureAtlas {
   int leg() const { return size_ - 3; }
   /// Texture coordinates of a face's corners.
   std::array<glm::vec2, 3> texcoords(std::size_t face) const;
-  /// Calls visit(texel, place) for all texels of a face: the number in the texture, row by row, and columns and rows from
-  /// the first corner, towards the two others.
+  /// Calls visit(texel, place) for all texels of a face: the number in the texture, row by row, and columns and rows
+  /// from the first corner, towards the two others.
   template <typename Visit>
   void for_texels(std::size_t face, const Visit& visit) const {
     const glm::ivec2 corner = first_corner(face);

@@ -16,7 +16,6 @@
 #include "loss/mesh_loss_impl.hpp"
 #include "mesh/remesh.hpp"
 #include "renderer/setter_checks.hpp"
-#include "scene/gradient_table.hpp"
 #include "solve/by_smoothing.hpp"
 #include "solve/large_steps.hpp"
 #include "solve/rigidity.hpp"
@@ -145,15 +144,7 @@ class Run {
   void prepare() {
     const Mesh mesh = state_.mesh();
     steps_.emplace(mesh, options_.lambda);
-    Scene scene;
-    scene.width = level_->width;
-    scene.height = level_->height;
-    scene.background = views_.background;
-    scene.camera = level_->views.front().camera;
-    scene.meshes.push_back({mesh});
-    scene.lights = views_.lights;
-    scene.smoothing = finest_;
-    scene.gradients = no_gradients();
+    Scene scene = scene_of_level(views_, *level_, mesh, finest_);
     scene.gradients.positions = true;
     scene.gradients.colors = color_optimizer_.has_value();
     scene.gradients.smoothing = is_adaptive();
@@ -297,13 +288,14 @@ ShapeSolver::ShapeSolver(std::vector<Device> devices, ShapeViews views, ShapeOpt
   check_devices(devices_);
   check_shape_views(views_);
   check_shape_options(options_, views_);
-  std::optional<Mesh> hull;
-  if (!views_.initial) hull = visual_hull(views_);
-  begins_with_hull_ = hull.has_value();
-  if (options_.iterations == 0) options_.iterations = hull ? k_iterations_from_hull : k_iterations;
-  start_ = with_vertex_colors(views_.initial ? *views_.initial
-                              : hull         ? *hull
-                                             : make_sphere(common_view(views_)));
+  std::optional<Mesh> start = views_.initial;
+  if (!start) {
+    start = visual_hull(views_);
+    begins_with_hull_ = start.has_value();
+  }
+  if (options_.iterations == 0)
+    options_.iterations = begins_with_hull_ ? k_iterations_from_hull : k_iterations;
+  start_ = with_vertex_colors(start ? *start : make_sphere(common_view(views_)));
   check_mesh_loss(options_.regularizers, start_);
   const ShapeTargets targets(views_, options_, ShapeLevel(views_, options_, 0));
   check_loss(targets.loss(), targets.images);

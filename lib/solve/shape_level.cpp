@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "scene/gradient_table.hpp"
 #include "solve/resample.hpp"
 #include "solve/shape_space.hpp"
 
@@ -41,6 +43,19 @@ void ShapeLevel::set_cameras(std::span<const ShapeState::MovedCamera> cameras) {
 std::pair<std::size_t, std::size_t> ShapeLevel::batch(unsigned iteration) const {
   const std::size_t b = iteration % (starts.size() - 1);
   return {starts[b], starts[b + 1] - starts[b]};
+}
+
+Scene scene_of_level(const ShapeViews& all, const ShapeLevel& level, Mesh mesh, const Smoothing& smoothing) {
+  Scene scene;
+  scene.width = level.width;
+  scene.height = level.height;
+  scene.background = all.background;
+  scene.camera = level.views.front().camera;
+  scene.meshes.push_back({std::move(mesh)});
+  scene.lights = all.lights;
+  scene.smoothing = smoothing;
+  scene.gradients = no_gradients();
+  return scene;
 }
 
 ShapeTargets::ShapeTargets(const ShapeViews& all, const ShapeOptions& options, const ShapeLevel& level)

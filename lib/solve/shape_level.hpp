@@ -31,6 +31,9 @@ struct ShapeLevel {
   std::vector<View> views;
 };
 
+/// A shape as a level's views show it, without gradients.
+Scene scene_of_level(const ShapeViews& all, const ShapeLevel& level, Mesh mesh, const Smoothing& smoothing);
+
 /// Targets of a level's views.
 struct ShapeTargets {
   ShapeTargets(const ShapeViews& all, const ShapeOptions& options, const ShapeLevel& level);

@@ -1,14 +1,12 @@
 // The texture of a shape whose views are known, by simultaneous iterative reconstruction (SIRT, Gilbert 1972): images
 // are linear in the texels, and each texel goes by the mean of what the pixels that show it lack.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include "dpr/multi_device.hpp"
 #include "dpr/shape.hpp"
 #include "mesh/texture_atlas.hpp"
-#include "scene/gradient_table.hpp"
 #include "solve/shape_checks.hpp"
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
@@ -118,15 +116,7 @@ Mesh find_texture(std::vector<Device> devices, const ShapeViews& all, const Mesh
   options.depth = options.normal = 0;
   const ShapeLevel level(views, options, 0);
   const ShapeTargets targets(views, options, level);
-  Scene scene;
-  scene.width = level.width;
-  scene.height = level.height;
-  scene.background = views.background;
-  scene.camera = level.views.front().camera;
-  scene.meshes.push_back({with_atlas(mesh, side)});
-  scene.lights = views.lights;
-  scene.smoothing = finest_smoothing(views, options);
-  scene.gradients = no_gradients();
+  Scene scene = scene_of_level(views, level, with_atlas(mesh, side), finest_smoothing(views, options));
   scene.gradients.texture = true;
   renderer.set_chunk(k_views_at_once);
   renderer.set_scene(scene);
@@ -145,7 +135,7 @@ Mesh find_texture(std::vector<Device> devices, const ShapeViews& all, const Mesh
   for (std::size_t k = 0; k < weights.size(); ++k) weights[k] -= at_black[k];
   double least = 0;  // less is rounding
   for (const glm::dvec3& weight : weights)
-    least = std::max({least, k_rounding * weight.x, k_rounding * weight.y});
+    least = std::max({least, k_rounding * weight.x, k_rounding * weight.y, k_rounding * weight.z});
   const TextureAtlas atlas(mesh.faces.size(), side);
   const std::vector<int> radii = pixel_radii(mesh, atlas, common_view(views).pixel);
   for (unsigned i = 0; i < k_texture_iterations; ++i) {
