@@ -16,6 +16,7 @@
 #include "cli/pose_options.hpp"
 #include "cli/pose_pictures.hpp"
 #include "cli/pose_report.hpp"
+#include "cli/pose_views.hpp"
 #include "cli/provenance.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
@@ -32,13 +33,13 @@ const char* const k_descent_group =
 constexpr unsigned k_adaptive_iterations = 800;
 
 struct PoseCommandOptions {
-  std::string scene, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
+  std::string scene, views, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
                                                report;
   std::vector<std::string> meshes;  // of each body
   PosePictureFiles pictures;
   BopOptions bop;  // no folder: a scene
   std::optional<std::string> method, box;
-  bool search = false, exif_focal = false;
+  bool search = false, moving = false, exif_focal = false;
   PoseOptions solver;
   LeastSquaresOptions least_squares;
   Descent descent;
@@ -223,10 +224,29 @@ void print_reference(const PoseResult& result, const std::optional<Pose>& truth)
               glm::length(result.pose.translation - truth->translation));
 }
 
+/// What belongs to a single picture, beside --views.
+void run_views(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
+  for (const char* const other : {"--target", "--mask", "--silhouette", "--depth", "--depth-scale", "--box",
+                                  "--camera", "--exif-focal", "--bop", "--initial-rotation", "--size"}) {
+    if (command.count(other) > 0) {
+      throw InvalidArgument(std::string(other) + " (command line)", "one beside --views",
+                            "none: the views file has pictures, cameras, masks and depths");
+    }
+  }
+  choose_method(command, options);
+  with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
+    find_poses_in_views({options.scene, options.views, options.output, options.report, options.meshes,
+                         options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
+                        common);
+    return 0;
+  });
+}
+
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // The outputs are checked before the work.
   require_writable(options.output);
   check_scene_options(options);
+  if (!options.views.empty()) return run_views(command, options, common);
   std::optional<glm::dmat3> rotation;
   if (!options.initial_rotation.empty())
     rotation = rotation_from_vector(parse_vector(options.initial_rotation, k_turn));
@@ -369,6 +389,10 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "scene has them, in front of the objects or behind them. Needed where the scene has several meshes")
       ->allow_extra_args(false)
       ->type_name("N[,N...]");
+  command
+      ->add_option("--views", options->views, "views")
+      ->type_name("V.json");
+  command->add_flag("--moving", options->moving, "moving");
   add_camera_options(*command, *options);
   CLI::Option* initial =
       command

@@ -7,14 +7,7 @@
 namespace dpr {
 namespace {
 
-// Marquardt's factor on the diagonal: where it begins, how it falls and rises, and where hope ends.
-constexpr double k_first_damping = 1e-2;
-constexpr double k_damping_fall = 0.2, k_damping_rise = 8;
-constexpr double k_least_damping = 1e-7, k_most_damping = 10;
-
-constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches no further
-constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
-constexpr double k_still_deviations = 0.3;   // nor do steps shorter than this part of the pose's uncertainty
+constexpr double k_still_deviations = 0.3;  // steps shorter than this part of the pose's uncertainty change nothing
 // Parts of the loss: what a step gains where no more is to be had, and what one loses that goes too far about the least.
 constexpr double k_little_gain = 1e-4, k_little_loss = 1e-2;
 // Steps like its last by which a candidate may reach the best one.

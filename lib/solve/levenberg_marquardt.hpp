@@ -8,6 +8,14 @@
 
 namespace dpr {
 
+// Marquardt's factor on the diagonal: where it begins, how it falls and rises, and where hope ends.
+inline constexpr double k_first_damping = 1e-2;
+inline constexpr double k_damping_fall = 0.2, k_damping_rise = 8;
+inline constexpr double k_least_damping = 1e-7, k_most_damping = 10;
+
+inline constexpr double k_longest_step_ndc = 0.25;  // a linear model of images reaches no further
+inline constexpr double k_still_pixels = 1e-2;      // steps shorter than this change nothing that can be seen
+
 /// A hypothesis at work.
 struct Candidate {
   Hypothesis hypothesis;

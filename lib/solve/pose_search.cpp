@@ -100,7 +100,8 @@ FittedPose Fit::run() {
     descend(shapes, *found);
     choose_normals(shapes[shapes.size() - 2]);
   }
-  PoseLevel level = make_level(final_shape(shapes.back()), light_);
+  const LevelShape final = final_shape(shapes.back());
+  PoseLevel level = make_level(final, light_);
   rescale(level);
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
@@ -120,7 +121,8 @@ FittedPose Fit::run() {
     result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
   }
   result_.explained = result_.doubt == PoseDoubt::none;
-  return {std::move(result_), normals_, level.scales().color, blank > 0 ? unexplained / blank : 1};
+  return {std::move(result_), normals_, level.scales().color, final.samples,
+          blank > 0 ? unexplained / blank : 1};
 }
 
 /// Through all levels but the last; `found` come in again where they were given up. Returns what was found if

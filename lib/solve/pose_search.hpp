@@ -13,6 +13,7 @@ struct FittedPose {
   PoseResult result;
   CornerNormals normals = CornerNormals::parted;
   float color_scale = 0;  ///< of the robust loss; 0: squares
+  int samples = 1;        ///< of a pixel's side, whose mean is compared
   double baseline_part =
       1;  ///< least loss of what explains nothing, in parts of that of a picture without object
 };

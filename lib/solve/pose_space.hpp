@@ -50,6 +50,7 @@ class PoseSpace {
   std::vector<double> to_world(std::span<const double> covariance) const;
 
   const PoseBody& body() const { return body_; }
+  const glm::dmat3& camera_axes() const { return camera_axes_; }  ///< columns, in the world
   double radius() const { return radius_; }  ///< of the object about its origin, world
   /// True if the pixels that have a depth, in the first channel where alpha is not 0, may be those of the object alone:
   /// they are no more than its sphere could cover about where it begins, and none is further from there along the axis

@@ -1,0 +1,24 @@
+// dpr pose in several pictures, which a views file names.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/common_options.hpp"
+#include "dpr/pose_views.hpp"
+
+namespace dpr::cli {
+
+/// What the options of dpr pose say of a fit in several pictures.
+struct PoseViewsOptions {
+  std::string scene, views, output, report;
+  std::vector<std::string> meshes;
+  PoseStart start = PoseStart::scene;
+  PoseOptions solver;
+};
+
+/// Finds the poses, writes them and their reports, a folder for each picture, and says how well they explain the
+/// pictures. Throws as the command does.
+void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& common);
+
+}  // namespace dpr::cli
