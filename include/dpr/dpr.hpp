@@ -24,6 +24,7 @@
 #include "dpr/photographs.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/pose_tracker.hpp"
+#include "dpr/pose_views.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/sampling_error.hpp"
 #include "dpr/scene.hpp"

@@ -1,4 +1,4 @@
-// An object's pose from one image.
+// An object's pose from one image, or from several that show the same pose.
 #pragma once
 
 #include <cstddef>
@@ -187,13 +187,25 @@ struct PoseResult : PoseHypothesis {
   PoseDoubt doubt = PoseDoubt::wrong_poses;  ///< why not
   /// The loss in parts of what is left without the pose: PoseOptions::explained has the bound.
   double unexplained_part = 1;
+  /// [view] of several: each one's loss in parts of that of a picture without the object.
+  std::vector<double> view_parts;
   /// Light found along with the pose: fixed if the scene's own light explains the target.
   PoseLight light = PoseLight::fixed;
   double seconds = 0;
   std::vector<PoseIteration> history;
 };
 
-/// Finds the pose of an object of the scene from one view.
+/// A picture of an object, the camera that took it, and what else was observed in it, all of the scene's size. Images are
+/// as LeastSquares has them; any of target, silhouette and depth will do without the others.
+struct PoseView {
+  Camera camera;
+  Image target;
+  Image mask{}, silhouette{}, depth{};
+};
+
+struct PoseProblem;
+
+/// Finds the pose of an object of the scene from one view, or the one that several views show.
 class DPR_API PoseSolver {
  public:
   /// Called once an iteration; false stops the solver, which then returns the best so far.
@@ -204,6 +216,12 @@ class DPR_API PoseSolver {
   /// mask, silhouette or depth differ from the scene's, one of these says nothing, the box holds nothing of the image,
   /// or an option is out of its range.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
+  /// From pictures by known cameras, in place of the scene's, which all count the same: the loss is their mean, each
+  /// in a light of its own where light is found. A search begins at the places that the first view's images leave open;
+  /// a translation's steps are along the first camera's axes, and a focal length or a lens to look for is a change that
+  /// all cameras share. LeastSquares without box, whose mask, silhouette and depth are empty; PoseObservation's weights
+  /// hold. Throws InvalidArgument for each view as above, and without views.
+  PoseSolver(Device device, Scene scene, std::vector<PoseView> views, PoseOptions options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;
@@ -221,10 +239,13 @@ class DPR_API PoseSolver {
   PoseResult search(const Callback& callback = {}) const;
 
  private:
+  std::vector<PoseProblem> problems() const;
+
   Device device_;
   Scene scene_;
   Image target_;
   PoseOptions options_;
+  std::vector<PoseView> others_;  // beside the first view, which is in the scene, target and options
 };
 
 /// Meshes of the bodies that move in a scene, each on its own: [body] is a list as PoseOptions::meshes. Meshes in no

@@ -1,4 +1,4 @@
-// An object's pose in several pictures.
+// An object's poses in several pictures by one camera.
 #pragma once
 
 #include <span>
@@ -7,14 +7,6 @@
 #include "dpr/pose.hpp"
 
 namespace dpr {
-
-/// A picture of an object, the camera that took it, and what else was observed in it, all of the scene's size. Images are
-/// as LeastSquares has them; any of target, silhouette and depth will do without the others.
-struct PoseView {
-  Camera camera;
-  Image target;
-  Image mask{}, silhouette{}, depth{};
-};
 
 /// Start of a fit in several pictures. scene: the poses that the scene has in front of each view's camera. unknown:
 /// none, as of PoseSolver::search().

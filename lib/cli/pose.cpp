@@ -29,12 +29,9 @@ const char* const k_least_squares_group = "Least squares (--method least_squares
 const char* const k_descent_group =
     "Descent (--method descent; any of these, or of the smoothing's, implies it)";
 
-/// Iterations of the paper's schedule, which shrinks the smoothing by a tenth every 50 iterations.
-constexpr unsigned k_adaptive_iterations = 800;
-
 struct PoseCommandOptions {
-  std::string scene, views, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal", output,
-                                               report;
+  std::string scene, views, camera, initial_rotation, loss = "mse", optimizer = "adam", schedule = "anneal",
+                                                      output, report;
   std::vector<std::string> meshes;  // of each body
   PosePictureFiles pictures;
   BopOptions bop;  // no folder: a scene
@@ -42,14 +39,8 @@ struct PoseCommandOptions {
   bool search = false, moving = false, exif_focal = false;
   PoseOptions solver;
   LeastSquaresOptions least_squares;
-  Descent descent;
+  DescentOptions descent;
 };
-
-OptimizerKind parse_optimizer(const std::string& word) {
-  static constexpr std::array<std::string_view, 2> names{"adam", "sgd"};
-  return std::array{OptimizerKind::adam,
-                    OptimizerKind::sgd}[position_of(word, names, "--optimizer (command line)")];
-}
 
 /// The method that is asked for, by name or by an option that only one of them has.
 bool wants_descent(const CLI::App& command, const std::optional<std::string>& method) {
@@ -77,13 +68,7 @@ void choose_method(const CLI::App& command, PoseCommandOptions& options) {
                           "options of one method: --search is least squares', --method descent and all of "
                           "the smoothing are the descent's");
   }
-  options.descent.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
-  options.descent.optimizer.kind = parse_optimizer(options.optimizer);
-  if (is_adaptive_schedule(options.schedule)) {
-    options.descent.schedule = AdaptiveSchedule{};
-    if (command.count("--iterations") == 0) options.descent.iterations = k_adaptive_iterations;
-  }
-  options.solver.method = options.descent;
+  options.solver.method = options.descent.method = read_descent(command, options.descent);
 }
 
 const char* const k_turn = "--initial-rotation (command line)";
@@ -101,8 +86,8 @@ std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& option
   first.meshes = bodies.front();
   const PoseSolver solver = named([&] { return PoseSolver(device, scene, target, first); });
   if (!options.report.empty()) make_folder(options.report);
-  const unsigned fits = bodies.size() > 1 ? k_most_fits * static_cast<unsigned>(bodies.size()) : 1;
-  const PoseSolver::Callback callback = progress_callback(fits * solver.most_iterations(), quiet);
+  const PoseSolver::Callback callback =
+      progress_callback(solver.most_iterations(), quiet, bodies.size() > 1 ? "object" : "");
   if (bodies.size() > 1) {
     const auto find = options.search ? search_bodies : solve_bodies;
     std::vector<FoundBody> found;
@@ -235,9 +220,10 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
   }
   choose_method(command, options);
   with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
-    find_poses_in_views({options.scene, options.views, options.output, options.report, options.meshes,
-                         options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
-                        common);
+    find_poses_in_views(
+        {options.scene, options.views, options.output, options.report, options.meshes, options.moving,
+         options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
+        common);
     return 0;
   });
 }
@@ -255,7 +241,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
   choose_method(command, options);
   options.pictures.mask = options.least_squares.mask;
-  ObservedPictures pictures = read_pictures(options.pictures, options.descent.loss, common.encoding());
+  ObservedPictures pictures = read_pictures(options.pictures, options.descent.method.loss, common.encoding());
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
   const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
@@ -351,22 +337,6 @@ void add_camera_options(CLI::App& command, PoseCommandOptions& options) {
       ->excludes(camera);
 }
 
-void add_descent_options(CLI::App& command, PoseCommandOptions& options) {
-  Descent& method = options.descent;
-  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
-    return command.add_option(name, value, description)->group(k_descent_group)->type_name(type);
-  };
-  add("--loss", options.loss, "Loss that is made small; mse by default", joined(loss_names()).c_str());
-  add("--iterations", method.iterations, "Steps; 200 by default, 800 with --schedule adaptive", "N");
-  add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
-  add("--optimizer", options.optimizer, "Optimizer of the steps; adam by default", "adam|sgd");
-  add("--schedule", options.schedule,
-      "Way the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
-      "anneal by default",
-      "anneal|adaptive");
-  add("--learning-rate", method.optimizer.learning_rate, "Size of the first steps; 0.05 by default", "FLOAT");
-}
-
 }  // namespace
 
 void add_pose_command(CLI::App& application, CommonOptions& common) {
@@ -389,9 +359,7 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "scene has them, in front of the objects or behind them. Needed where the scene has several meshes")
       ->allow_extra_args(false)
       ->type_name("N[,N...]");
-  command
-      ->add_option("--views", options->views, "views")
-      ->type_name("V.json");
+  command->add_option("--views", options->views, "views")->type_name("V.json");
   command->add_flag("--moving", options->moving, "moving");
   add_camera_options(*command, *options);
   CLI::Option* initial =
@@ -418,7 +386,7 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
       ->type_name("DIR");
   add_bop_options(*command, options->bop);
   add_least_squares_options(*command, *options);
-  add_descent_options(*command, *options);
+  add_descent_options(*command, k_descent_group, options->descent);
   add_common_options(*command, common);
   command->footer(
       "Example: dpr pose --scene scene.json --target target.exr --search -o pose.json --report report");

@@ -1,8 +1,12 @@
-// Options of least squares.
+// Options of the methods.
 #include "cli/pose_options.hpp"
 
+#include <array>
+
 #include "base/name_list.hpp"
+#include "cli/option_names.hpp"
 #include "cli/pose_report.hpp"
+#include "cli/text.hpp"
 #include "dpr/image.hpp"
 
 namespace dpr::cli {
@@ -39,6 +43,36 @@ LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptio
   LeastSquares method = options.method;
   method.robust = command.count("--robust") > 0;
   method.light = static_cast<PoseLight>(position_of(options.light, light_names(), "--light (command line)"));
+  return method;
+}
+
+void add_descent_options(CLI::App& command, const char* group, DescentOptions& options) {
+  Descent& method = options.method;
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    return command.add_option(name, value, description)->group(group)->type_name(type);
+  };
+  add("--loss", options.loss, "Loss that is made small; mse by default", joined(loss_names()).c_str());
+  add("--iterations", method.iterations, "Steps; 200 by default, 800 with --schedule adaptive", "N");
+  add("--restarts", method.restarts, "Further descents while the target is not explained; 6 by default", "N");
+  add("--optimizer", options.optimizer, "Optimizer of the steps; adam by default", "adam|sgd");
+  add("--schedule", options.schedule,
+      "Way the smoothing shrinks: in fixed steps from coarse to fine, or by the paper's adaptive schedule; "
+      "anneal by default",
+      "anneal|adaptive");
+  add("--learning-rate", method.optimizer.learning_rate, "Size of the first steps; 0.05 by default", "FLOAT");
+}
+
+Descent read_descent(const CLI::App& command, const DescentOptions& options) {
+  static constexpr std::array<std::string_view, 2> k_optimizers{"adam", "sgd"};
+  constexpr unsigned k_adaptive_iterations = 800;  // the paper's schedule takes a tenth off every 50
+  Descent method = options.method;
+  method.loss = LossWeights::only(parse_loss(options.loss, "--loss"));
+  const std::size_t optimizer = position_of(options.optimizer, k_optimizers, "--optimizer (command line)");
+  method.optimizer.kind = std::array{OptimizerKind::adam, OptimizerKind::sgd}[optimizer];
+  if (is_adaptive_schedule(options.schedule)) {
+    method.schedule = AdaptiveSchedule{};
+    if (command.count("--iterations") == 0) method.iterations = k_adaptive_iterations;
+  }
   return method;
 }
 

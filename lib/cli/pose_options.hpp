@@ -1,4 +1,4 @@
-// Options that a pose from one image and poses of a sequence share.
+// Options of the methods that find poses.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -18,5 +18,15 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
 
 /// The method that the options describe, without the mask. Throws InvalidArgument.
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options);
+
+/// A descent as the command line describes it.
+struct DescentOptions {
+  Descent method;
+  std::string loss = "mse", optimizer = "adam", schedule = "anneal";
+};
+
+void add_descent_options(CLI::App& command, const char* group, DescentOptions& options);
+/// Throws InvalidArgument.
+Descent read_descent(const CLI::App& command, const DescentOptions& options);
 
 }  // namespace dpr::cli

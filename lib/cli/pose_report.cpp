@@ -177,13 +177,17 @@ std::string suffix_of(const FoundBody& body, std::size_t bodies) {
   return (body.meshes.size() > 1 ? ", meshes " : ", mesh ") + text;
 }
 
-PoseSolver::Callback progress_callback(unsigned iterations, bool quiet) {
+PoseSolver::Callback progress_callback(unsigned iterations, bool quiet, const std::string& part) {
   const auto progress = std::make_shared<Progress>(iterations, quiet, "step", "of at most");
-  return [progress, iterations, done = 0U](const PoseIteration& step) mutable {
+  return [progress, iterations, part, done = 0U, last = PoseIteration{}](const PoseIteration& step) mutable {
+    const bool is_other_fit = !part.empty() && (step.body != last.body || step.width < last.width);
+    if (is_other_fit || done == iterations) done = 0;
+    last = step;
     const std::string restart = step.descent > 0 ? format("restart %u  ", step.descent) : "";
-    progress->update(done++ % iterations + 1,
-                     restart + format("%dx%d  poses tried: %u  loss %.4e", step.width, step.height,
-                                      step.hypotheses, step.loss));
+    const std::string of_part = part.empty() ? "" : part + format(" %zu  ", step.body);
+    progress->update(++done, of_part + restart +
+                                 format("%dx%d  poses tried: %u  loss %.4e", step.width, step.height,
+                                        step.hypotheses, step.loss));
     return true;
   };
 }

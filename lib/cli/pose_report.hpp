@@ -32,9 +32,9 @@ struct FoundBody {
 /// ", meshes 1, 2", to tell one of several bodies from the others; empty for an only one.
 std::string suffix_of(const FoundBody& body, std::size_t bodies);
 
-/// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. It
-/// must not outlive the returned object's copies.
-PoseSolver::Callback progress_callback(unsigned iterations, bool quiet);
+/// A callback for the solver that shows how far it is; `iterations` of one descent or through all levels. `part`: what
+/// PoseIteration::body counts, each fitted several times; empty: one fit.
+PoseSolver::Callback progress_callback(unsigned iterations, bool quiet, const std::string& part = "");
 
 /// A pose with its parts, as pose.json has it, of a body of the scene.
 Json hypothesis_to_json(const PoseHypothesis& hypothesis, const Scene& scene, const PoseBody& body);

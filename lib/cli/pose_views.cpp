@@ -42,36 +42,87 @@ std::vector<PoseView> pose_views(ShapeViews views, const std::string& file, bool
   return result;
 }
 
-/// What was found in each of the pictures.
+/// What was found in the pictures.
 struct FoundViews {
-  std::vector<Scene> scenes;  // with the views' cameras
-  std::vector<FoundBody> found;
-  std::vector<FoundLight> lights;
+  bool moving;
+  std::vector<Scene> scenes;       // [view] with its camera
+  std::vector<FoundBody> found;    // [view]
+  std::vector<FoundLight> lights;  // [view]
 };
 
+/// Of a moving object a pose for each view; otherwise that of a single picture, and each view's camera and light.
 Json views_to_json(const FoundViews& views) {
-  Json json{{"width", views.scenes.front().width}, {"height", views.scenes.front().height}};
-  json["explained"] = std::ranges::all_of(views.found, [](const FoundBody& f) { return f.result.explained; });
-  json["focal_scale"] = views.found.front().result.focal_scale;
-  Json& pictures = json["views"] = Json::array();
+  const PoseResult& first = views.found.front().result;
+  Json json;
+  if (views.moving) {
+    json = {{"width", views.scenes.front().width},
+            {"height", views.scenes.front().height},
+            {"focal_scale", first.focal_scale}};
+    json["explained"] =
+        std::ranges::all_of(views.found, [](const FoundBody& found) { return found.result.explained; });
+  } else {
+    json = poses_to_json(views.scenes.front(), {views.found.data(), 1});
+    json.erase("camera");
+  }
   for (std::size_t i = 0; i < views.scenes.size(); ++i) {
-    Json own = poses_to_json(views.scenes[i], {&views.found[i], 1});
+    const Scene& scene = views.scenes[i];
+    Json own;
+    if (views.moving) {
+      own = poses_to_json(scene, {&views.found[i], 1});
+      for (const char* const shared : {"width", "height"}) own.erase(shared);
+    } else {
+      own["camera"] = camera_with_view(calibrated(scene.camera, first.focal_scale, first.radial));
+      if (i < first.view_parts.size()) own["part_of_blank"] = first.view_parts[i];
+    }
     add_light(own, views.lights[i]);
-    for (const char* const shared : {"width", "height"}) own.erase(shared);
-    pictures.push_back(std::move(own));
+    json["views"].push_back(std::move(own));
   }
   return json;
 }
 
-void print_explained(const FoundViews& views, const std::string& output) {
+void print_moving(const FoundViews& views, const std::string& output) {
   std::size_t explained = 0;
   for (std::size_t i = 0; i < views.found.size(); ++i) {
     const PoseResult& result = views.found[i].result;
     explained += result.explained ? 1 : 0;
     if (!result.explained)
-      std::printf("View %zu is not explained: %s.\n", i, doubt_text(result).c_str());
+      std::printf("View %zu is not explained: %s. Its pose may be wrong.\n", i, doubt_text(result).c_str());
   }
   std::printf("%s: %zu of %zu views are explained\n", output.c_str(), explained, views.found.size());
+}
+
+void print_still(const PoseResult& result, const std::string& output) {
+  std::printf("%s: loss %.6g after %u iterations, %.1f s\n", output.c_str(), result.loss, result.iterations,
+              result.seconds);
+  if (result.explained) return;
+  std::printf("The views are not explained: %s. The pose may be wrong", doubt_text(result).c_str());
+  if (!result.view_parts.empty()) {
+    const auto worst = std::ranges::max_element(result.view_parts);
+    std::printf("; view %td leaves most", worst - result.view_parts.begin());
+  }
+  std::printf(".\n");
+}
+
+/// The views' scene, of their size.
+Scene read_scene_of(const PoseViewsOptions& options, const ShapeViews& views, const CommonOptions& common) {
+  Scene scene = read_scene(options.scene, common, glm::ivec2(views.width, views.height));
+  scene.width = views.width;
+  scene.height = views.height;
+  return scene;
+}
+
+/// [view]
+std::vector<PoseResult> solve(const PoseViewsOptions& options, const PoseOptions& solver,
+                              const Device& device, const Scene& scene, const std::vector<PoseView>& views,
+                              bool quiet) {
+  const PoseSolver all(device, scene, views, solver);
+  if (!options.report.empty()) make_folder(options.report);
+  const PoseSolver::Callback callback =
+      progress_callback(all.most_iterations(), quiet, options.moving ? "view" : "");
+  if (options.moving) return solve_moving(device, scene, views, solver, options.start, callback);
+  const PoseResult result =
+      options.start == PoseStart::unknown ? all.search(callback) : all.solve(all.scene_pose(), callback);
+  return std::vector<PoseResult>(views.size(), result);
 }
 
 }  // namespace
@@ -79,10 +130,8 @@ void print_explained(const FoundViews& views, const std::string& output) {
 void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& common) {
   Notes notes;
   ShapeViews read = parse_views_file(options.views, read_file(options.views), notes, common.encoding()).views;
-  Scene scene = read_scene(options.scene, common, glm::ivec2(read.width, read.height));
   print_notes(notes, common);
-  scene.width = read.width;
-  scene.height = read.height;
+  const Scene scene = read_scene_of(options, read, common);
   const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
   if (bodies.size() > 1)
     throw InvalidArgument("--mesh (command line)", "several beside --views", "one: the meshes of one object");
@@ -90,11 +139,9 @@ void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& c
   solver.meshes = bodies.front();
   const bool is_alone = scene.meshes.size() == std::max<std::size_t>(1, solver.meshes.size());
   const std::vector<PoseView> views = pose_views(std::move(read), options.views, is_alone);
-  if (!options.report.empty()) make_folder(options.report);
   const Device device = open_device(common);
-  const PoseSolver::Callback callback = [](const PoseIteration&) { return true; };
-  std::vector<PoseResult> results = solve_moving(device, scene, views, solver, options.start, callback);
-  FoundViews found;
+  std::vector<PoseResult> results = solve(options, solver, device, scene, views, common.quiet);
+  FoundViews found{options.moving, {}, {}, {}};
   for (std::size_t i = 0; i < views.size(); ++i) {
     Scene& own = found.scenes.emplace_back(scene);
     own.camera = views[i].camera;
@@ -108,10 +155,15 @@ void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& c
     const std::string title =
         format("The pose in view %zu of ", i) + std::filesystem::path(options.views).filename().string();
     write_pose_report(std::filesystem::path(options.report) / std::to_string(i),
-                      page_source(title, common, {&device, 1}), device, found.scenes[i],
-                      {&found.found[i], 1}, views[i].target, found.lights[i], common.quiet);
+                      page_source(title, common, {&device, 1}), device, found.scenes[i], {&found.found[i], 1},
+                      views[i].target, found.lights[i], common.quiet);
   }
-  if (!common.quiet) print_explained(found, options.output);
+  if (common.quiet) return;
+  if (options.moving) {
+    print_moving(found, options.output);
+  } else {
+    print_still(found.found.front().result, options.output);
+  }
 }
 
 }  // namespace dpr::cli

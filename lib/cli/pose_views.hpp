@@ -13,6 +13,7 @@ namespace dpr::cli {
 struct PoseViewsOptions {
   std::string scene, views, output, report;
   std::vector<std::string> meshes;
+  bool moving = false;
   PoseStart start = PoseStart::scene;
   PoseOptions solver;
 };

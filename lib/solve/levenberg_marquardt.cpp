@@ -154,7 +154,7 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report) {
   // A robust loss is mostly what it has given up on: its parts say little.
-  const bool is_squared = level.scales().color == 0 && !level.has_observations();
+  const bool is_squared = level.color_scale() == 0 && !level.has_observations();
   linearize(level, candidates);
   std::vector<double> losses;
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solve/pose_scatter.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {
@@ -99,15 +98,11 @@ void set_robust_scale(PoseLevel& level, const LeastSquares& method, std::span<co
     return;
   }
   level.estimate_scale(hypotheses);
-  const float scale = level.scales().color;
-  if (scale > 0) level.set_color_scale(std::clamp(scale, k_least_robust_scale, k_most_robust_scale));
+  level.clamp_color_scales(k_least_robust_scale, k_most_robust_scale);
 }
 
 std::vector<double> pose_covariance(PoseLevel& level, const PoseSpace& space, const Hypothesis& hypothesis) {
-  const ScoreCells cells = level.score_cells(hypothesis);
-  NormalEquations equations = cells.equations;
-  equations.scatter = score_scatter(cells, space.size(), level.scales().color);
-  const std::vector<double> result = covariance(equations, space.size());
+  const std::vector<double> result = covariance(level.judge(hypothesis), space.size());
   return result.empty() ? result : space.to_world(result);
 }
 

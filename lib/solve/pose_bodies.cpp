@@ -127,6 +127,7 @@ std::vector<PoseResult> BodiesFit::run() {
 }
 
 std::vector<PoseResult> BodiesFit::run_in(PoseLight light) {
+  constexpr unsigned k_most_rounds = 8;
   constexpr double k_still = 0.02;  // pixels, less than noise moves a pose
   for (MovingBody& body : bodies_) {
     body.method().light = light;

@@ -12,9 +12,6 @@
 
 namespace dpr {
 
-/// At most: rounds in which several bodies are found; fits of each body, two in the second round, in two lights.
-inline constexpr unsigned k_most_rounds = 8, k_most_fits = 2 * (k_most_rounds + 1);
-
 /// A mesh of a body: a point p of it is R (linear p + offset) + t in the world where the body's pose is R, t.
 struct BodyPart {
   std::size_t mesh;  ///< entry of Scene::meshes

@@ -15,7 +15,6 @@
 #include "solve/pose_beam.hpp"
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_scatter.hpp"
 #include "solve/pose_search.hpp"
 
 namespace dpr {
@@ -31,15 +30,13 @@ struct SharedCamera {
 
 /// A picture, and what was found in it.
 struct MovingView {
-  Scene scene;  // with the view's camera
-  const Image* target;
-  PoseOptions options;
+  PoseProblem problem;
   Pose start;
   FittedPose fitted{};
   std::vector<PoseIteration> history{};
   double seconds = 0;
-  bool is_searched = false;
 
+  const LeastSquares& method() const { return std::get<LeastSquares>(problem.options.method); }
   PoseResult& result() { return fitted.result; }
 };
 
@@ -54,20 +51,21 @@ struct JointView {
 
   JointView(MovingView& of, const SharedCamera& camera)
       : view(of),
-        pivot(of.scene, of.options),
-        space(pivot.scene(), pivot.to_middle(of.result().pose), of.options),
+        pivot(of.problem.scene, of.problem.options),
+        space(pivot.scene(), pivot.to_middle(of.result().pose), of.problem.options),
         hypothesis{pivot.to_middle(of.result().pose), camera.focal_scale, camera.radial} {}
 
   void make_level(const Device& device, LevelShape shape, bool is_last);
 };
 
 void JointView::make_level(const Device& device, LevelShape shape, bool is_last) {
-  const auto& method = std::get<LeastSquares>(view.options.method);
+  const LeastSquares& method = view.method();
+  const Image& target = view.problem.target;
   if (is_last) shape.samples = view.fitted.samples;
-  level.emplace(device, pivot.scene(), *view.target, method, space, shape, view.result().light,
+  level.emplace(device, LevelPicture{pivot.scene(), target, method}, space, shape, view.result().light,
                 view.fitted.normals);
   level->weigh_observations({&hypothesis, 1});
-  if (method.robust && !view.target->pixels.empty()) set_robust_scale(*level, method, {&hypothesis, 1});
+  if (method.robust && !target.pixels.empty()) set_robust_scale(*level, method, {&hypothesis, 1});
   equations = level->linearize({&hypothesis, 1}).front();
 }
 
@@ -78,7 +76,7 @@ class JointSystem {
   explicit JointSystem(std::vector<JointView>& views)
       : views_(views),
         of_view_(static_cast<Eigen::Index>(views.front().space.size())),
-        of_pose_(views.front().view.options.solve_translation ? k_pose_size : k_rotation_size),
+        of_pose_(views.front().view.problem.options.solve_translation ? k_pose_size : k_rotation_size),
         size_(of_pose_ * std::ssize(views) + of_view_ - of_pose_) {}
 
   /// Takes steps of all views until none gains anything. False if `report` stopped it.
@@ -175,11 +173,7 @@ bool JointSystem::refine(unsigned iterations, const std::function<bool()>& repor
 }
 
 std::vector<std::vector<double>> JointSystem::covariances() {
-  for (JointView& view : views_) {
-    const ScoreCells cells = view.level->score_cells(view.hypothesis);
-    view.equations = cells.equations;
-    view.equations.scatter = score_scatter(cells, view.space.size(), view.level->scales().color);
-  }
+  for (JointView& view : views_) view.equations = view.level->judge(view.hypothesis);
   const Eigen::MatrixXd hessian =
       assembled([](const JointView& v) -> const auto& { return v.equations.hessian; });
   const Eigen::MatrixXd scatter =
@@ -227,15 +221,9 @@ MovingFit::MovingFit(const Device& device, const Scene& scene, std::span<const P
       finds_camera_(options.solve_focal || options.solve_distortion),
       known_(start == PoseStart::unknown ? Foreknowledge::place : Foreknowledge::start),
       callback_(callback) {
+  const PoseSolver checks_the_rest(device, scene, {views.begin(), views.end()}, options);
   for (const PoseView& view : views) {
-    MovingView& own = views_.emplace_back(MovingView{scene, &view.target, options, {}});
-    own.scene.camera = view.camera;
-    auto& method = std::get<LeastSquares>(own.options.method);
-    method.mask = view.mask;
-    method.silhouette.image = view.silhouette;
-    method.depth.image = view.depth;
-    const PoseSolver checks_the_rest(device, own.scene, view.target, own.options);
-    own.start = checks_the_rest.scene_pose();
+    views_.push_back({problem_of(view, scene, options), checks_the_rest.scene_pose()});
   }
 }
 
@@ -283,13 +271,12 @@ bool MovingFit::report(std::size_t view, PoseIteration step) {
 /// In the camera that was found last.
 void MovingFit::fit_alone(std::size_t view, const std::vector<Pose>& initial, Foreknowledge known) {
   MovingView& own = views_[view];
-  Scene scene = own.scene;
-  scene.camera = calibrated(scene.camera, camera_.focal_scale, camera_.radial);
-  PoseOptions options = own.options;
-  options.solve_focal = options.solve_distortion = false;
-  if (known == Foreknowledge::pose) std::get<LeastSquares>(options.method).rotations = 0;
+  PoseProblem problem = own.problem;
+  problem.scene.camera = calibrated(problem.scene.camera, camera_.focal_scale, camera_.radial);
+  problem.options.solve_focal = problem.options.solve_distortion = false;
+  if (known == Foreknowledge::pose) std::get<LeastSquares>(problem.options.method).rotations = 0;
   const auto start = Clock::now();
-  own.fitted = fit_pose(device_, scene, *own.target, options, initial, known,
+  own.fitted = fit_pose(device_, {&problem, 1}, initial, known,
                         [&](const PoseIteration& step) { return report(view, step); });
   own.seconds += seconds_since(start);
   const auto see = [&](PoseHypothesis& h) { h.focal_scale = camera_.focal_scale, h.radial = camera_.radial; };
@@ -314,17 +301,17 @@ void MovingFit::fit_together(const std::vector<std::size_t>& which) {
   std::vector<JointView> views;
   for (const std::size_t i : which) views.emplace_back(views_[i], camera_);
   JointSystem system(views);
-  const auto& method = std::get<LeastSquares>(views.front().view.options.method);
-  const std::vector<LevelShape> shapes = level_shapes(views.front().view.scene, method);
+  const LeastSquares& method = views.front().view.method();
+  const std::vector<LevelShape> shapes = level_shapes(views.front().pivot.scene(), method);
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     for (JointView& view : views) view.make_level(device_, shapes[i], i + 1 == shapes.size());
     const auto go_on = [&] {
       const JointView& first = views.front();
       const Hypothesis& h = first.hypothesis;
-      return report(which.front(), {0, 0, system.loss() / static_cast<double>(views.size()),
-                                    first.level->smoothing(), first.level->width(), first.level->height(),
-                                    static_cast<unsigned>(views.size()), first.pivot.to_origin(h.pose),
-                                    h.focal_scale, h.radial});
+      return report(which.front(),
+                    {0, 0, system.loss() / static_cast<double>(views.size()), first.level->smoothing(),
+                     first.level->width(), first.level->height(), static_cast<unsigned>(views.size()),
+                     first.pivot.to_origin(h.pose), h.focal_scale, h.radial});
     };
     if (!system.refine(k_patience * method.iterations, go_on)) break;
   }
@@ -344,17 +331,9 @@ void MovingFit::fit_together(const std::vector<std::size_t>& which) {
 std::vector<PoseResult> solve_moving(const Device& device, const Scene& scene,
                                      std::span<const PoseView> views, const PoseOptions& options,
                                      PoseStart start, const PoseSolver::Callback& callback) {
-  require(!views.empty(), "views (pose)", views.size(), "at least one");
-  const auto* method = std::get_if<LeastSquares>(&options.method);
-  if (method == nullptr) throw InvalidArgument("method (pose)", "a descent in several views", "least squares");
-  if (method->box) throw InvalidArgument("box (pose)", "one in several views", "none");
-  for (const Image* image : {&method->mask, &method->silhouette.image, &method->depth.image}) {
-    if (!image->pixels.empty())
-      throw InvalidArgument("observations (pose)", "one of the options beside those of the views",
-                            "none: each view has its own");
-  }
+  require_views(views, options);
   if (start == PoseStart::unknown)
-    require(method->rotations > 0, "rotations (pose search)", method->rotations, "at least 1");
+    require(std::get<LeastSquares>(options.method).rotations > 0, "rotations (pose search)", 0, "at least 1");
   return MovingFit(device, scene, views, options, start, callback).run();
 }
 

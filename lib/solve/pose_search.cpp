@@ -24,23 +24,25 @@ constexpr std::size_t k_wrong = 15;
 /// One fit at work: the candidates on their way through the levels.
 class Fit {
  public:
-  Fit(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-      std::span<const Pose> initial, const PosePlaces& places, Foreknowledge known,
-      const PoseSolver::Callback& callback)
+  Fit(const Device& device, std::span<const PoseProblem> pictures, std::span<const Pose> initial,
+      const PosePlaces& places, Foreknowledge known, const PoseSolver::Callback& callback)
       : device_(device),
-        scene_(scene),
-        target_(target),
-        options_(options),
-        method_(std::get<LeastSquares>(options.method)),
-        light_wanted_(target.pixels.empty() ? PoseLight::fixed : method_.light),
+        scene_(pictures.front().scene),
+        options_(pictures.front().options),
+        method_(std::get<LeastSquares>(options_.method)),
+        has_colors_(std::ranges::any_of(pictures, [](const auto& p) { return !p.target.pixels.empty(); })),
+        light_wanted_(has_colors_ ? method_.light : PoseLight::fixed),
         callback_(callback),
         anywhere_(known == Foreknowledge::place),
         is_near_(known == Foreknowledge::pose),
         beam_(beam_of(method_)),
         initial_(initial.begin(), initial.end()),
         places_(places),
-        space_(scene, places.about(), options),
-        half_turns_(half_turns(space_.body().points(scene))) {}
+        space_(scene_, places.about(), options_),
+        half_turns_(half_turns(space_.body().points(scene_))) {
+    for (const PoseProblem& p : pictures)
+      pictures_.push_back({p.scene, p.target, std::get<LeastSquares>(p.options.method)});
+  }
 
   FittedPose run();
 
@@ -72,11 +74,12 @@ class Fit {
   bool report(const PoseLevel& level);
 
   const Device& device_;
-  const Scene& scene_;
-  const Image& target_;
+  const Scene& scene_;  // of the first picture, as its options
   const PoseOptions& options_;
   const LeastSquares& method_;
-  PoseLight light_wanted_;  // fixed of a target without colours
+  std::vector<LevelPicture> pictures_;
+  bool has_colors_;
+  PoseLight light_wanted_;  // fixed of targets without colours
   const PoseSolver::Callback& callback_;
   bool anywhere_, is_near_;  // the first initial pose is as good as any; it is nearly right
   const Beam& beam_;
@@ -113,7 +116,8 @@ FittedPose Fit::run() {
   const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
   finish(level);
   const double blank = sampled.blank_loss(), unexplained = std::min(wrong_, blank);
-  const bool is_robust = method_.robust || (target_.pixels.empty() && !method_.depth.image.pixels.empty());
+  const bool is_robust = method_.robust || (!has_colors_ && !method_.depth.image.pixels.empty());
+  if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
   if (unexplained > 0) result_.unexplained_part = result_.loss / unexplained;
   if (result_.loss < explained_part(options_.explained, is_robust) * unexplained) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
@@ -121,7 +125,7 @@ FittedPose Fit::run() {
     result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
   }
   result_.explained = result_.doubt == PoseDoubt::none;
-  return {std::move(result_), normals_, level.scales().color, final.samples,
+  return {std::move(result_), normals_, level.color_scale(), final.samples,
           blank > 0 ? unexplained / blank : 1};
 }
 
@@ -167,7 +171,7 @@ void Fit::try_half_turns(PoseLevel& level) {
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
   const std::optional<glm::dmat3> rotation =
       is_near_ ? std::optional(initial_.front().rotation) : std::nullopt;
-  return PoseLevel(device_, scene_, target_, method_, space_, shape, light, normals_, rotation);
+  return PoseLevel(device_, pictures_, space_, shape, light, normals_, rotation);
 }
 
 /// True if a further search in the scene's own light is in vain. A robust loss cannot tell.
@@ -186,7 +190,7 @@ float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
   PoseLevel lit = make_level(shape, light_wanted_);
   level.estimate_scale(hypotheses());
   lit.estimate_scale(hypotheses());
-  return level.scales().color > 0 ? lit.scales().color / level.scales().color : 1;
+  return level.color_scale() > 0 ? lit.color_scale() / level.color_scale() : 1;
 }
 
 /// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
@@ -228,7 +232,7 @@ LevelShape Fit::final_shape(LevelShape shape) const {
 
 void Fit::set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const {
   level.weigh_observations(hypotheses);
-  if (!method_.robust || target_.pixels.empty()) return;
+  if (!method_.robust || !has_colors_) return;
   set_robust_scale(level, method_, hypotheses);
 }
 
@@ -290,10 +294,17 @@ void Fit::choose_equals() {
   }
 }
 
-FittedPose fit_about_middle(const Device& device, const Scene& scene, const Image& target,
-                            const PoseOptions& options, std::span<const Pose> initial, Foreknowledge known,
+/// One picture, or several of the same scene in other cameras.
+FittedPose fit_about_middle(const Device& device, std::span<const PoseProblem> pictures,
+                            std::span<const Pose> initial, Foreknowledge known,
                             const PoseSolver::Callback& callback) {
-  const PosePivot pivot(scene, options);
+  const PosePivot pivot(pictures.front().scene, pictures.front().options);
+  std::vector<PoseProblem> about_middle(pictures.begin(), pictures.end());
+  for (PoseProblem& picture : about_middle) {
+    const Camera camera = picture.scene.camera;
+    picture.scene = pivot.scene();
+    picture.scene.camera = camera;
+  }
   std::vector<Pose> starts;
   for (const Pose& pose : initial) starts.push_back(pivot.to_middle(pose));
   PoseSolver::Callback report;
@@ -304,9 +315,10 @@ FittedPose fit_about_middle(const Device& device, const Scene& scene, const Imag
     };
   }
   const bool anywhere = known == Foreknowledge::place;
-  const PosePlaces places(pivot.scene(), options, starts.front(), anywhere);
+  const PoseProblem& first = about_middle.front();
+  const PosePlaces places(first.scene, first.options, starts.front(), anywhere);
   if (anywhere) starts = {places.about()};
-  FittedPose fitted = Fit(device, pivot.scene(), target, options, starts, places, known, report).run();
+  FittedPose fitted = Fit(device, about_middle, starts, places, known, report).run();
   PoseResult& result = fitted.result;
   pivot.to_origin(result.pose, result.covariance);
   result.pose = pivot.to_origin(result.pose);
@@ -318,14 +330,21 @@ FittedPose fit_about_middle(const Device& device, const Scene& scene, const Imag
 
 }  // namespace
 
+FittedPose fit_pose(const Device& device, std::span<const PoseProblem> pictures,
+                    std::span<const Pose> initial, Foreknowledge known,
+                    const PoseSolver::Callback& callback) {
+  const PoseProblem& first = pictures.front();
+  const std::optional<PoseBox> box = box_of_search(first.options, known == Foreknowledge::place);
+  if (!box || pictures.size() > 1) return fit_about_middle(device, pictures, initial, known, callback);
+  const PoseProblem part = cut_to_box(first.scene, first.target, first.options, *box);
+  return fit_about_middle(device, {&part, 1}, initial, known, callback);
+}
+
 FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, Foreknowledge known,
                     const PoseSolver::Callback& callback) {
-  if (const std::optional<PoseBox> box = box_of_search(options, known == Foreknowledge::place)) {
-    const PoseProblem part = cut_to_box(scene, target, options, *box);
-    return fit_about_middle(device, part.scene, part.target, part.options, initial, known, callback);
-  }
-  return fit_about_middle(device, scene, target, options, initial, known, callback);
+  const PoseProblem picture{scene, target, options};
+  return fit_pose(device, {&picture, 1}, initial, known, callback);
 }
 
 }  // namespace dpr

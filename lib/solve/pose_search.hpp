@@ -3,8 +3,8 @@
 
 #include <span>
 
-#include "dpr/pose.hpp"
 #include "solve/pose_light.hpp"
+#include "solve/pose_problem.hpp"
 
 namespace dpr {
 
@@ -25,7 +25,10 @@ enum class Foreknowledge {
   pose  ///< the same; the rotation is nearly right, so that light has directions at meshes that stand still too
 };
 
-/// Fits from the initial poses and the options' rotations together.
+/// Fits from the initial poses and the options' rotations together, in one picture or in several, whose scenes differ in
+/// their cameras and whose options in their images.
+FittedPose fit_pose(const Device& device, std::span<const PoseProblem> pictures,
+                    std::span<const Pose> initial, Foreknowledge known, const PoseSolver::Callback& callback);
 FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
                     std::span<const Pose> initial, Foreknowledge known, const PoseSolver::Callback& callback);
 

@@ -48,14 +48,23 @@ PoseSpace::PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions&
       focal_index_(k_translation + (translation_ ? 3 : 0)),
       radial_index_(focal_index_ + (focal_ ? 1 : 0)),
       size_(radial_index_ + (distortion_ ? 2 : 0)) {
-  const glm::dmat4 view(scene.camera.view);
-  camera_axes_ =
-      glm::transpose(polar_decomposition(glm::dmat3(view)).rotation);  // columns: the axes in the world
+  camera_axes_ = glm::transpose(polar_decomposition(glm::dmat3(glm::dmat4(scene.camera.view)))
+                                    .rotation);  // columns: the axes in the world
   double squared_radius = 0;
   for (const glm::dvec3& p : body_.points(scene)) squared_radius = std::max(squared_radius, glm::dot(p, p));
   radius_ = std::sqrt(std::max(squared_radius, 1e-30));
+  look(scene);
+}
+
+PoseSpace PoseSpace::seen_by(const Scene& scene) const {
+  PoseSpace result = *this;
+  result.look(scene);
+  return result;
+}
+
+void PoseSpace::look(const Scene& scene) {
   // An object about or behind the camera still needs units to move in.
-  const glm::dvec3 centre(view * glm::dvec4(initial.translation, 1.0));
+  const glm::dvec3 centre(glm::dmat4(scene.camera.view) * glm::dvec4(initial_translation_, 1.0));
   distance_ = std::max(-centre.z, static_cast<double>(scene.camera.znear));
   rim_ = (glm::length(glm::dvec2(centre)) + radius_) / distance_;
   if (is_fisheye(scene.camera)) rim_ = std::atan(rim_);
@@ -135,8 +144,8 @@ ViewGradient PoseSpace::view_tangent(const Hypothesis& hypothesis, const Camera&
 }
 
 Hypothesis PoseSpace::absent(const Camera& camera) const {
-  const glm::dvec3 eye(glm::inverse(glm::dmat4(camera.view))[3]);
-  return {{glm::dmat3(1.0), eye + 2 * radius_ * camera_axes_[2]}};
+  const glm::dmat4 to_world = glm::inverse(glm::dmat4(camera.view));
+  return {{glm::dmat3(1.0), glm::dvec3(to_world[3]) + 2 * radius_ * glm::normalize(glm::dvec3(to_world[2]))}};
 }
 
 bool PoseSpace::may_cover(const Image& depths) const {

@@ -30,6 +30,9 @@ class PoseSpace {
   /// `initial` tells how far away the object is.
   PoseSpace(const Scene& scene, const Pose& initial, const PoseOptions& options);
 
+  /// The same parameters, along the same axes, with the sizes that things have in that scene's camera.
+  PoseSpace seen_by(const Scene& scene) const;
+
   std::size_t size() const { return size_; }
   Hypothesis moved(const Hypothesis& from, const Step& step) const;
   /// Change of each parameter that moves the object's rim by a fraction `ndc` of the image.
@@ -51,7 +54,7 @@ class PoseSpace {
 
   const PoseBody& body() const { return body_; }
   const glm::dmat3& camera_axes() const { return camera_axes_; }  ///< columns, in the world
-  double radius() const { return radius_; }  ///< of the object about its origin, world
+  double radius() const { return radius_; }                       ///< of the object about its origin, world
   /// True if the pixels that have a depth, in the first channel where alpha is not 0, may be those of the object alone:
   /// they are no more than its sphere could cover about where it begins, and none is further from there along the axis
   /// than its radius, or where a translation is looked for its diameter.
@@ -61,14 +64,17 @@ class PoseSpace {
   double relative_distance(double distance) const { return is_perspective_ ? distance / distance_ : 1; }
 
  private:
+  void look(const Scene& scene);
+
   PoseBody body_;
   glm::dmat3 camera_axes_;
   glm::dvec3 initial_translation_;
   bool translation_, focal_, distortion_, is_perspective_;
   std::size_t focal_index_, radial_index_, size_;  // where their parameters begin, and how many there are
-  double radius_, distance_, radius_ndc_;
-  double rim_;  // the largest tangent at which the object is seen, about
-  double ndc_per_tangent_;
+  double radius_;
+  double distance_ = 0, radius_ndc_ = 0;  // in the camera
+  double rim_ = 0;                        // the largest tangent at which the object is seen, about
+  double ndc_per_tangent_ = 0;
 };
 
 }  // namespace dpr

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "dpr/pose.hpp"
+#include "solve/pose_problem.hpp"
 
 namespace dpr {
 
@@ -12,13 +12,6 @@ void validate_box(const PoseBox& box, const Scene& scene);
 
 /// Bounding box of the pixels whose first channel is above half of the largest; none where all are 0.
 std::optional<PoseBox> extent(const Image& weights);
-
-/// A scene, its target and its observations.
-struct PoseProblem {
-  Scene scene;
-  Image target;
-  PoseOptions options;
-};
 
 /// The problem in the pixels about a box alone: none is further away than a quarter of the larger side of the box. The
 /// box of the options, if there is one, moves along. The camera must be a perspective one.

@@ -23,7 +23,7 @@ TrackLevels::TrackLevels(const Device& device, const Scene& scene, const PoseOpt
     const bool is_coarse = i == 0 && shapes.size() > 1 && first.result.light == PoseLight::harmonics;
     const PoseLight light = is_coarse ? PoseLight::gain : first.result.light;
     levels_.emplace_back(
-        new Level{.level = PoseLevel(device, scene, frame, method, space_, shapes[i], light, first.normals),
+        new Level{.level = PoseLevel(device, {scene, frame, method}, space_, shapes[i], light, first.normals),
                   .has_frame = true});
     levels_.back()->level.set_color_scale(first.color_scale);
   }

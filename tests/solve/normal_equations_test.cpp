@@ -352,7 +352,7 @@ TEST_SUITE("pipeline") {
     for (std::size_t i = 1; i < hypotheses.size(); ++i)
       hypotheses[i] = space.moved(hypotheses[i - 1], {0.02, -0.01, 0.03, 0.01, 0.02, 0});
     const auto bytes_of = [&](PoseLight light, int samples) {
-      PoseLevel level(device, scene, target, LeastSquares{}, space, {scene.height, 0.25F, samples}, light,
+      PoseLevel level(device, {scene, target, LeastSquares{}}, space, {scene.height, 0.25F, samples}, light,
                       CornerNormals::parted);
       const std::vector<NormalEquations> first = level.linearize(hypotheses);
       const std::atomic<std::size_t>& bytes = impl_of(device).bytes_from_device;

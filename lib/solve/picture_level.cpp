@@ -1,0 +1,294 @@
+// Images of hypotheses against the target, and the derivatives of their difference.
+#include "solve/picture_level.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "dpr/subdivision.hpp"
+#include "renderer/frame.hpp"
+#include "solve/level_scene.hpp"
+#include "solve/pose_pyramid.hpp"
+#include "solve/resample.hpp"
+
+namespace dpr {
+namespace {
+
+// A batch as large as keeps a device busy; the bounds keep its memory small.
+constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
+constexpr std::size_t k_most_faces = std::size_t{1} << 20;
+
+constexpr double k_color_channels = 3;
+constexpr std::size_t k_coverage = 0, k_depth = 1;  // kinds of MeasuredWeights
+
+/// Positions and faces alone, black.
+Mesh shape_of(const Mesh& mesh) {
+  Mesh shape;
+  shape.positions = mesh.positions;
+  shape.faces = mesh.faces;
+  shape.vertex_colors.resize(shape.positions.size());
+  return shape;
+}
+
+/// The meshes without colours and light, their vertices with room for depths in place of colours.
+Scene shapes_alone(Scene scene) {
+  for (Instance& instance : scene.meshes) instance.mesh = shape_of(instance.mesh);
+  scene.lights.reset();
+  scene.background = glm::vec3(0);
+  return scene;
+}
+
+/// Each mesh coloured by its normals in the body's axes. Directions of light turn with the body: meshes that stand
+/// still have normals only where the body's rotation is nearly known, and else are seen in the mean light.
+Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals normals,
+                   const std::optional<glm::dmat3>& rotation) {
+  Scene result = scene;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Mesh& mesh = mesh_of(scene, i);
+    const glm::mat4& transform = scene.meshes[i].transform;
+    result.meshes[i] = {shape_of(mesh), transform};
+    if (rotation) {
+      result.meshes[i].mesh =
+          colored_by_normals(mesh, glm::transpose(*rotation) * glm::dmat3(transform), normals);
+    }
+  }
+  for (const BodyPart& part : body.parts())
+    result.meshes[part.mesh].mesh = colored_by_normals(mesh_of(scene, part.mesh), part.linear, normals);
+  return result;
+}
+
+/// That of one of sixteen is less: the very best may fit by luck. Empty: 0.
+float best_of(std::vector<float> numbers) {
+  constexpr std::ptrdiff_t k_best = 16;
+  if (numbers.empty()) return 0;
+  const auto best = numbers.begin() + std::ssize(numbers) / k_best;
+  std::ranges::nth_element(numbers, best);
+  return *best;
+}
+
+std::size_t pixels_of(const Scene& scene) {
+  return static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+}
+
+glm::vec3 rgb(const cl_float4& color) { return {color.s[0], color.s[1], color.s[2]}; }
+
+}  // namespace
+
+PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image& target,
+                           const LeastSquares& options, const PoseSpace& space, const LevelShape& shape,
+                           PoseLight light, CornerNormals normals, const std::optional<glm::dmat3>& rotation)
+    : space_(space.seen_by(scene)),
+      samples_(shape.samples),
+      is_finest_(shape.short_side == std::min(scene.width, scene.height)),
+      colors_{Renderer(device)},
+      counts_colors_(!target.pixels.empty()),
+      trusts_coverage_(!options.robust && (counts_colors_ || !options.silhouette.image.pixels.empty())),
+      factors_{options.silhouette.weight, options.depth.weight} {
+  const Scene whole = level_scene(scene, space_, options, shape, light);
+  const std::vector<View> lenses = space_.seen_through_lenses(whole.camera);
+  const auto show = [&](Images& images, const Scene& shown) {
+    images.renderer.set_scene(subdivide_for_lens(shown, {}, lenses).scene);
+  };
+  scene_ = subdivide_for_lens(whole, {}, lenses).scene;
+  colors_.renderer.set_scene(scene_);
+  if (light == PoseLight::harmonics) {
+    show(normals_.emplace(Images{Renderer(device)}), with_normals(whole, space_.body(), normals, rotation));
+  }
+  if (!options.depth.image.pixels.empty())
+    show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));
+  target_.background = scene.background;
+  const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
+                                                 : resample(options.mask, width(), height());
+  if (counts_colors_) {
+    resample_colors(target);
+    for (const glm::vec4& p : mask.pixels) target_.weights.push_back(p.x);
+  } else {
+    target_.colors.resize(mask.pixels.size());
+    target_.weights.resize(mask.pixels.size());
+  }
+  if (dpr::has_observations(options)) target_.measured = measured(options, mask);
+  sums_.emplace(device, target_, light, space_.size());
+}
+
+void PictureLevel::resample_colors(const Image& target) {
+  target_.colors.clear();
+  for (const glm::vec4& p : resample(target, width(), height()).pixels)
+    target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+}
+
+void PictureLevel::set_target(const Image& target) {
+  resample_colors(target);
+  sums_->set_target(target_.colors);
+}
+
+std::vector<cl_float4> PictureLevel::measured(const LeastSquares& options, const Image& mask) const {
+  std::vector<cl_float4> result(mask.pixels.size());
+  const auto add = [&](const Image& image, std::size_t kind) {
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      result[i].s[2 * kind] = image.pixels[i].x;
+      result[i].s[2 * kind + 1] = image.pixels[i].w * mask.pixels[i].x;
+    }
+  };
+  Image silhouette = options.silhouette.image, depth = options.depth.image;
+  for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
+  if (silhouette.pixels.empty() && !counts_colors_ && space_.body().is_alone() && space_.may_cover(depth)) {
+    silhouette = depth;
+    for (glm::vec4& p : silhouette.pixels) p.x = p.w;
+  }
+  for (glm::vec4& p : silhouette.pixels) p.w = 1;
+  if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
+  if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
+  return result;
+}
+
+double PictureLevel::pixel_ndc() const { return 2.0 / std::min(width(), height()); }
+
+template <typename Visitor>
+void PictureLevel::in_batches(std::span<const Hypothesis> hypotheses, std::size_t images_each,
+                              const Visitor& visit) const {
+  std::size_t faces = 0;
+  for (std::size_t i = 0; i < scene_.meshes.size(); ++i) faces += mesh_of(scene_, i).faces.size();
+  const std::size_t fitting = std::min(k_most_pixels / pixels_of(scene_), k_most_faces / faces);
+  const std::size_t batch = std::max(fitting / images_each, std::size_t{1});
+  for (std::size_t first = 0; first < hypotheses.size(); first += batch)
+    visit(hypotheses.subspan(first, std::min(batch, hypotheses.size() - first)));
+}
+
+std::vector<View> PictureLevel::views_of(std::span<const Hypothesis> hypotheses) const {
+  std::vector<View> views;
+  for (const Hypothesis& hypothesis : hypotheses) views.push_back(space_.view(hypothesis, scene_.camera));
+  return views;
+}
+
+const Buffer<cl_float4>& PictureLevel::render(Images& images, std::span<const View> views) {
+  images.renderer.set_views(views);
+  if (images.shows_depths) show_depths(images.renderer);
+  images.renderer.forward();
+  const Buffer<cl_float4>& samples = last_frame(images.renderer, "PictureLevel").image;
+  return samples_ == 1 ? samples : averaged(samples, images.means);
+}
+
+const Buffer<cl_float4>& PictureLevel::averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means) {
+  sums_->average(samples, static_cast<std::size_t>(width()), static_cast<std::size_t>(samples_), means);
+  return means;
+}
+
+HypothesisImages PictureLevel::render(std::span<const Hypothesis> hypotheses) {
+  const std::vector<View> views = views_of(hypotheses);
+  const Buffer<cl_float4>* const depths = depths_ ? &render(*depths_, views) : nullptr;
+  // Of depths alone the coverage will do.
+  const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : render(colors_, views);
+  return {views.size(), colors, normals_ ? render(*normals_, views) : colors,
+          depths != nullptr ? *depths : colors};
+}
+
+std::pair<HypothesisImages, HypothesisTangents> PictureLevel::render_tangents(
+    std::span<const Hypothesis> hypotheses) {
+  const HypothesisImages images = render(hypotheses);
+  std::vector<SceneTangent> directions(space_.size());
+  for (std::size_t k = 0; k < directions.size(); ++k) {
+    for (const Hypothesis& hypothesis : hypotheses)
+      directions[k].views.push_back(space_.view_tangent(hypothesis, scene_.camera, k));
+  }
+  const auto tangents_of = [&](Images& of) -> const Buffer<cl_float4>& {
+    const Buffer<cl_float4>& samples = last_tangents(of.renderer, directions, "PictureLevel");
+    return samples_ == 1 ? samples : averaged(samples, of.tangents);
+  };
+  const Buffer<cl_float4>* const depths = depths_ ? &tangents_of(*depths_) : nullptr;
+  const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : tangents_of(colors_);
+  return {images, {colors, normals_ ? tangents_of(*normals_) : colors, depths != nullptr ? *depths : colors}};
+}
+
+void PictureLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
+  std::vector<float> scales;
+  in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
+    std::ranges::copy_if(sums_->scales(render(batch)), std::back_inserter(scales),
+                         [](float scale) { return scale > 0; });
+  });
+  scales_.color = best_of(std::move(scales));
+}
+
+void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
+  constexpr float k_scale = 4;  // deviations, of robust losses
+  constexpr float k_coverage_scale = 0.5F;
+  // What pixels leave of coverage anywhere; and in parts of a pixel's side, of depth.
+  constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
+  // What residuals say beyond this, before the finest level, is how wrong the poses are.
+  constexpr float k_most_coverage = 0.25F, k_most_of_pixel = 1;
+  if (!has_observations()) return;
+  std::array<std::vector<float>, std::tuple_size_v<Deviations>> found;
+  in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
+    for (const Deviations& deviations : sums_->deviations(render(batch))) {
+      for (std::size_t kind = 0; kind < found.size(); ++kind)
+        if (deviations[kind]) found[kind].push_back(*deviations[kind]);
+    }
+  });
+  const auto pixel = static_cast<float>(space_.radius() / space_.radius_ndc() * pixel_ndc());
+  const float of_colors = best_of(found[0]);
+  float of_coverage = std::max(best_of(found[1]), k_least_coverage);
+  float of_depth = std::max(best_of(found[2]), k_least_of_pixel * pixel);
+  scales_.measured[k_coverage].scale = trusts_coverage_ ? 0 : k_coverage_scale;
+  scales_.measured[k_depth].scale = k_scale * of_depth;
+  if (!is_finest_) {
+    of_coverage = std::min(of_coverage, k_most_coverage);
+    of_depth = std::min(of_depth, k_most_of_pixel * pixel);
+  }
+  const bool counts_coverage =
+      std::ranges::any_of(target_.measured, [](const cl_float4& m) { return m.s[1] > 0; });
+  const float unit = of_colors > 0 ? of_colors : counts_coverage ? of_coverage : of_depth;
+  scales_.measured[k_coverage].weight = factors_[k_coverage] * std::pow(unit / of_coverage, 2.0F);
+  scales_.measured[k_depth].weight = factors_[k_depth] * std::pow(unit / of_depth, 2.0F);
+}
+
+std::vector<double> PictureLevel::losses(std::span<const Hypothesis> hypotheses) {
+  std::vector<double> result;
+  in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
+    std::ranges::copy(sums_->losses(render(batch), scales_), std::back_inserter(result));
+  });
+  return result;
+}
+
+std::vector<NormalEquations> PictureLevel::linearize(std::span<const Hypothesis> hypotheses) {
+  std::vector<NormalEquations> result;
+  in_batches(hypotheses, space_.size() + 1, [&](std::span<const Hypothesis> batch) {
+    const auto [images, tangents] = render_tangents(batch);
+    std::ranges::copy(sums_->linearize(images, tangents, scales_), std::back_inserter(result));
+  });
+  return result;
+}
+
+ScoreCells PictureLevel::score_cells(const Hypothesis& hypothesis) {
+  const auto [images, tangents] = render_tangents({&hypothesis, 1});
+  return sums_->score_cells(images, tangents, scales_, static_cast<std::size_t>(width()));
+}
+
+double PictureLevel::blank_loss() {
+  const std::size_t pixels = target_.colors.size();
+  const auto robust = [](double squared, float scale) {
+    return squared / (1 + (scale > 0 ? squared / std::pow(static_cast<double>(scale), 2) : 0));
+  };
+  double observed = 0;  // nothing is covered
+  const ResidualWeight& coverage = scales_.measured[k_coverage];
+  for (const cl_float4& m : target_.measured) {
+    const auto wanted = static_cast<double>(m.s[0]), counts = static_cast<double>(m.s[1]);
+    observed += counts * static_cast<double>(coverage.weight) * robust(wanted * wanted, coverage.scale);
+  }
+  const double weight = sums_->total() / k_color_channels;
+  glm::dvec3 mean(0.0);
+  for (std::size_t i = 0; i < pixels; ++i)
+    mean += glm::dvec3(rgb(target_.colors[i]) * target_.weights[i]) / weight;
+  const auto loss_of = [&](const glm::dvec3& color) {
+    double sum = 0;
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const glm::dvec3 residual = color - glm::dvec3(rgb(target_.colors[i]));
+      sum += static_cast<double>(target_.weights[i]) * robust(glm::dot(residual, residual), scales_.color);
+    }
+    return sum;
+  };
+  const double blank = (std::min(loss_of(target_.background), loss_of(mean)) + observed) / sums_->total();
+  if (space_.body().is_alone()) return blank;
+  const Hypothesis absent = space_.absent(scene_.camera);
+  return std::min(blank, losses({&absent, 1}).front());
+}
+
+}  // namespace dpr
