@@ -221,7 +221,8 @@ class DPR_API PoseSolver {
   /// a translation's steps are along the first camera's axes, and a focal length or a lens to look for is a change that
   /// all cameras share. LeastSquares without box, whose mask, silhouette and depth are empty; PoseObservation's weights
   /// hold. Throws InvalidArgument for each view as above, and without views.
-  PoseSolver(Device device, Scene scene, std::vector<PoseView> views, PoseOptions options = {});
+  static PoseSolver of_views(Device device, const Scene& scene, const std::vector<PoseView>& views,
+                             const PoseOptions& options = {});
 
   /// The pose of the scene's transform: rotation and translation, its scale taken apart.
   Pose scene_pose() const;

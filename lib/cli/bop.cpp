@@ -150,4 +150,18 @@ void write_bop_result(const fs::path& file, const BopOptions& options, const Pos
                              checks::text(result.seconds) + "\n");
 }
 
+void add_bop_options(CLI::App& command, BopOptions& options) {
+  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
+    command.add_option(name, value, description)->group("BOP (https://bop.felk.cvut.cz)")->type_name(type);
+  };
+  add("--bop", options.folder,
+      "Folder of a scene of a BOP data set, in place of --scene: camera, picture, model (millimetres) and, "
+      "without --search, the start are its files'; the translation is looked for, and P.json or a row of "
+      "results in P.csv is written",
+      "DATASET/test/000001");
+  add("--image", options.image, "Number of the image", "N");
+  add("--object", options.object, "Number of the object", "ID");
+  add("--models", options.models, "Folder of the models; DATASET/models by default", "DIR");
+}
+
 }  // namespace dpr::cli

@@ -2,6 +2,7 @@
 // and reference, and rows of results.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
@@ -44,5 +45,7 @@ std::uint64_t bop_scene_number(const std::string& folder);
 
 /// Writes a row of results below BOP's head. The score is 1 where the pose explains the picture, or else 0.
 void write_bop_result(const std::filesystem::path& file, const BopOptions& options, const PoseResult& result);
+
+void add_bop_options(CLI::App& command, BopOptions& options);
 
 }  // namespace dpr::cli

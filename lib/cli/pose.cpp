@@ -309,20 +309,6 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       ->group(k_least_squares_group);
 }
 
-void add_bop_options(CLI::App& command, BopOptions& options) {
-  const auto add = [&](const char* name, auto& value, const char* description, const char* type) {
-    command.add_option(name, value, description)->group("BOP (https://bop.felk.cvut.cz)")->type_name(type);
-  };
-  add("--bop", options.folder,
-      "Folder of a scene of a BOP data set, in place of --scene: camera, picture, model (millimetres) and, "
-      "without --search, the start are its files'; the translation is looked for, and P.json or a row of "
-      "results in P.csv is written",
-      "DATASET/test/000001");
-  add("--image", options.image, "Number of the image", "N");
-  add("--object", options.object, "Number of the object", "ID");
-  add("--models", options.models, "Folder of the models; DATASET/models by default", "DIR");
-}
-
 void add_camera_options(CLI::App& command, PoseCommandOptions& options) {
   CLI::Option* camera =
       command
@@ -359,8 +345,19 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "scene has them, in front of the objects or behind them. Needed where the scene has several meshes")
       ->allow_extra_args(false)
       ->type_name("N[,N...]");
-  command->add_option("--views", options->views, "views")->type_name("V.json");
-  command->add_flag("--moving", options->moving, "moving");
+  CLI::Option* views =
+      command
+          ->add_option(
+              "--views", options->views,
+              "Pictures in place of --target, with cameras, masks, depths and silhouettes, in the format of "
+              "dpr fit: all show the object in the same pose")
+          ->type_name("V.json");
+  command
+      ->add_flag(
+          "--moving", options->moving,
+          "The object has a pose of its own in each of the views, whose cameras say where it begins; --focal "
+          "and --distortion look for one focal length and lens of all")
+      ->needs(views);
   add_camera_options(*command, *options);
   CLI::Option* initial =
       command

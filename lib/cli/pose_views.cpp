@@ -115,7 +115,7 @@ Scene read_scene_of(const PoseViewsOptions& options, const ShapeViews& views, co
 std::vector<PoseResult> solve(const PoseViewsOptions& options, const PoseOptions& solver,
                               const Device& device, const Scene& scene, const std::vector<PoseView>& views,
                               bool quiet) {
-  const PoseSolver all(device, scene, views, solver);
+  const PoseSolver all = PoseSolver::of_views(device, scene, views, solver);
   if (!options.report.empty()) make_folder(options.report);
   const PoseSolver::Callback callback =
       progress_callback(all.most_iterations(), quiet, options.moving ? "view" : "");

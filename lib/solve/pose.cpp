@@ -98,8 +98,8 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
   validate(scene_, target_, options_);
 }
 
-PoseSolver::PoseSolver(Device device, Scene scene, std::vector<PoseView> views, PoseOptions options)
-    : device_(std::move(device)) {
+PoseSolver PoseSolver::of_views(Device device, const Scene& scene, const std::vector<PoseView>& views,
+                                const PoseOptions& options) {
   require_views(views, options);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const PoseProblem problem = problem_of(views[i], scene, options);
@@ -110,10 +110,9 @@ PoseSolver::PoseSolver(Device device, Scene scene, std::vector<PoseView> views, 
     }
   }
   PoseProblem first = problem_of(views.front(), scene, options);
-  scene_ = std::move(first.scene);
-  target_ = std::move(first.target);
-  options_ = std::move(first.options);
-  others_.assign(std::next(views.begin()), views.end());
+  PoseSolver solver(std::move(device), std::move(first.scene), first.target, std::move(first.options));
+  solver.others_.assign(std::next(views.begin()), views.end());
+  return solver;
 }
 
 std::vector<PoseProblem> PoseSolver::problems() const {

@@ -2,6 +2,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,6 +28,11 @@ struct SharedCamera {
   double focal_scale = 1;
   glm::dvec2 radial{0.0};
 };
+
+double difference(const SharedCamera& a, const SharedCamera& b) {
+  const glm::dvec2 radial = glm::abs(a.radial - b.radial);
+  return std::max({std::abs(std::log(a.focal_scale / b.focal_scale)), radial.x, radial.y});
+}
 
 /// A picture, and what was found in it.
 struct MovingView {
@@ -202,7 +208,7 @@ class MovingFit {
  private:
   void fit_alone(std::size_t view, const std::vector<Pose>& initial, Foreknowledge known);
   void fit_again(std::size_t view, bool is_near);
-  void fit_together(const std::vector<std::size_t>& which);
+  void fit_together(const std::vector<std::size_t>& which, bool begins_coarse);
   std::vector<std::size_t> explained() const;
   bool report(std::size_t view, PoseIteration step);
 
@@ -221,23 +227,28 @@ MovingFit::MovingFit(const Device& device, const Scene& scene, std::span<const P
       finds_camera_(options.solve_focal || options.solve_distortion),
       known_(start == PoseStart::unknown ? Foreknowledge::place : Foreknowledge::start),
       callback_(callback) {
-  const PoseSolver checks_the_rest(device, scene, {views.begin(), views.end()}, options);
+  const PoseSolver checks_the_rest =
+      PoseSolver::of_views(device, scene, {views.begin(), views.end()}, options);
   for (const PoseView& view : views) {
     views_.push_back({problem_of(view, scene, options), checks_the_rest.scene_pose()});
   }
 }
 
 std::vector<PoseResult> MovingFit::run() {
-  constexpr unsigned k_most_rounds_together = 4;
+  constexpr unsigned k_most_rounds_together = 6;
+  constexpr double k_same = 1e-3;  // of the focal length, and of the lens' coefficients
   for (std::size_t i = 0; i < views_.size(); ++i) fit_alone(i, {views_[i].start}, known_);
   std::vector<std::size_t> last;
+  SharedCamera before;
   for (unsigned round = 0; finds_camera_ && goes_on_ && round < k_most_rounds_together; ++round) {
     std::vector<std::size_t> which = explained();
     if (which.empty()) {
       for (std::size_t i = 0; i < views_.size(); ++i) which.push_back(i);
     }
-    if (which == last) break;
-    fit_together(which);
+    const bool is_last = which == last && difference(camera_, before) < k_same;
+    if (is_last) break;
+    before = camera_;
+    fit_together(which, round == 0);
     for (std::size_t i = 0; i < views_.size(); ++i) fit_again(i, std::ranges::count(which, i) > 0);
     last = std::move(which);
   }
@@ -274,7 +285,11 @@ void MovingFit::fit_alone(std::size_t view, const std::vector<Pose>& initial, Fo
   PoseProblem problem = own.problem;
   problem.scene.camera = calibrated(problem.scene.camera, camera_.focal_scale, camera_.radial);
   problem.options.solve_focal = problem.options.solve_distortion = false;
-  if (known == Foreknowledge::pose) std::get<LeastSquares>(problem.options.method).rotations = 0;
+  if (known == Foreknowledge::pose) {  // which coarser images may lead away from
+    auto& method = std::get<LeastSquares>(problem.options.method);
+    method.rotations = 0;
+    method.coarsest = static_cast<unsigned>(std::min(problem.scene.width, problem.scene.height));
+  }
   const auto start = Clock::now();
   own.fitted = fit_pose(device_, {&problem, 1}, initial, known,
                         [&](const PoseIteration& step) { return report(view, step); });
@@ -284,26 +299,30 @@ void MovingFit::fit_alone(std::size_t view, const std::vector<Pose>& initial, Fo
   std::ranges::for_each(own.result().equals, see);
 }
 
-/// In a camera that has changed: from the pose that was found along with it, or else from the start again.
+/// In a camera that has changed: from the poses that were found along with it and before, or else from the start too.
 void MovingFit::fit_again(std::size_t view, bool is_near) {
   MovingView& own = views_[view];
   const PoseResult last = own.result();
+  std::vector<Pose> initial{last.pose};
+  for (const PoseHypothesis& h : last.equals) initial.push_back(h.pose);
   if (!is_near) {
-    fit_alone(view, {own.start, last.pose}, known_);
+    initial.insert(initial.begin(), own.start);
+    fit_alone(view, initial, known_);
     own.result().covariance.clear();
     return;
   }
-  fit_alone(view, {last.pose}, Foreknowledge::pose);
+  fit_alone(view, initial, Foreknowledge::pose);
   own.result().covariance = last.covariance;
 }
 
-void MovingFit::fit_together(const std::vector<std::size_t>& which) {
+/// From the coarsest level where the camera may be far off; it may lead poses astray that are nearly right.
+void MovingFit::fit_together(const std::vector<std::size_t>& which, bool begins_coarse) {
   std::vector<JointView> views;
   for (const std::size_t i : which) views.emplace_back(views_[i], camera_);
   JointSystem system(views);
   const LeastSquares& method = views.front().view.method();
   const std::vector<LevelShape> shapes = level_shapes(views.front().pivot.scene(), method);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
+  for (std::size_t i = begins_coarse ? 0 : shapes.size() - 2; i < shapes.size(); ++i) {
     for (JointView& view : views) view.make_level(device_, shapes[i], i + 1 == shapes.size());
     const auto go_on = [&] {
       const JointView& first = views.front();

@@ -99,7 +99,7 @@ double size_of(const std::vector<double>& covariance, std::size_t first, std::si
 
 dpr::Image noisy(dpr::Image image, unsigned seed) {
   std::mt19937 engine(seed);
-  std::normal_distribution<float> draw(0, 0.1F);
+  std::normal_distribution<float> draw(0, 0.05F);
   for (glm::vec4& pixel : image.pixels) {
     for (int i = 0; i < 3; ++i) pixel[i] += draw(engine);
   }
@@ -113,7 +113,8 @@ TEST_SUITE("pipeline") {
     const dpr::Device device = dpr::open_device();
     dpr::Scene scene = board_scene();
     const std::vector<dpr::PoseView> views = views_of(device, scene, 1);
-    const dpr::PoseResult of_view = dpr::PoseSolver(device, scene, views, near_options()).solve(k_start);
+    const dpr::PoseResult of_view =
+        dpr::PoseSolver::of_views(device, scene, views, near_options()).solve(k_start);
     scene.camera = views.front().camera;
     const dpr::PoseResult single =
         dpr::PoseSolver(device, scene, views.front().target, near_options()).solve(k_start);
@@ -130,7 +131,8 @@ TEST_SUITE("pipeline") {
     std::vector<dpr::PoseView> views = views_of(device, scene, 3);
     for (std::size_t i = 0; i < views.size(); ++i)
       views[i].target = noisy(views[i].target, static_cast<unsigned>(i));
-    const dpr::PoseResult all = dpr::PoseSolver(device, scene, views, near_options()).solve(k_start);
+    const dpr::PoseResult all =
+        dpr::PoseSolver::of_views(device, scene, views, near_options()).solve(k_start);
     REQUIRE(all.view_parts.size() == views.size());
     if (is_reduced()) return;
     CHECK(all.explained);
@@ -138,7 +140,8 @@ TEST_SUITE("pipeline") {
     const double error = glm::length(all.pose.translation);
     double mean = 0;
     for (const dpr::PoseView& view : views) {
-      const dpr::PoseResult one = dpr::PoseSolver(device, scene, {view}, near_options()).solve(k_start);
+      const dpr::PoseResult one =
+          dpr::PoseSolver::of_views(device, scene, {view}, near_options()).solve(k_start);
       mean += glm::length(one.pose.translation) / static_cast<double>(views.size());
       CHECK(size_of(all.covariance, 3, 6) < 0.7 * size_of(one.covariance, 3, 6));
     }
@@ -153,7 +156,8 @@ TEST_SUITE("pipeline") {
     const dpr::Scene scene = board_scene();
     std::vector<dpr::PoseView> views = views_of(device, scene, 3);
     views[1].camera = camera_at(scene.camera, -k_turns[1], k_places[1]);
-    const dpr::PoseResult all = dpr::PoseSolver(device, scene, views, near_options()).solve(k_start);
+    const dpr::PoseResult all =
+        dpr::PoseSolver::of_views(device, scene, views, near_options()).solve(k_start);
     CHECK_FALSE(all.explained);
     REQUIRE(all.view_parts.size() == 3);
     CHECK(all.view_parts[1] > 2 * all.view_parts[0]);
@@ -168,7 +172,7 @@ TEST_SUITE("pipeline") {
     scene.meshes.front().transform = glm::mat4(glm::dmat4(dpr::rotation_from_vector({2, 1, -0.5})));
     dpr::PoseOptions options = near_options();
     std::get<dpr::LeastSquares>(options.method).rotations = 288;
-    const dpr::PoseResult found = dpr::PoseSolver(device, scene, views, options).search();
+    const dpr::PoseResult found = dpr::PoseSolver::of_views(device, scene, views, options).search();
     CHECK(found.explained);
     CHECK(dpr::angle_degrees(found.pose.rotation, glm::dmat3(1.0)) < 0.3);
     CHECK(glm::length(found.pose.translation) < 0.02);
@@ -246,7 +250,7 @@ TEST_SUITE("pipeline") {
     const dpr::Scene scene = board_scene();
     std::vector<dpr::PoseView> views = views_of(device, scene, 2);
     const auto make = [&](const dpr::PoseOptions& options) {
-      dpr::PoseSolver(device, scene, views, options);
+      dpr::PoseSolver::of_views(device, scene, views, options);
     };
     dpr::PoseOptions options = near_options();
     std::get<dpr::LeastSquares>(options.method).mask = views[0].target;
