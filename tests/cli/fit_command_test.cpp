@@ -377,6 +377,9 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--schedule", "sometimes"}), "sometimes");
     fails(good, with(k_short, {"--blur", "0"}), "--blur (command line)");
     fails(good, with(k_short, {"--edge", "-1"}), "--edge (command line)");
+    fails(good, with(k_short, {"--laplacian", ""}),
+          "--laplacian (command line): got \"\", expected a number");
+    fails(good, with(k_short, {"--sigma", ""}), "--sigma (command line): got \"\", expected a number");
     fails(good, with(k_short, {"--blur-end", "0"}), "--blur-end (command line)");
     fails(good, with(k_short, {"--camera-learning-rate", "0"}), "--camera-learning-rate (command line)");
     fails(good, with(k_short, {"--save-views", "nowhere/views.json"}), "nowhere");
