@@ -4,11 +4,14 @@
     build/release/bin/dpr_experiments shapes -o FOLDER      # leaves spot.truth.obj, torus.truth.obj, ...
     venv/bin/python bench/experiments/foreign_shapes.py pictures FOLDER/*.truth.obj -o VIEWS
     venv/bin/python bench/experiments/foreign_shapes.py shapes VIEWS --dpr build/release/bin/dpr -o shapes.json
+    venv/bin/python bench/experiments/foreign_shapes.py wrong VIEWS --dpr build/release/bin/dpr -o wrong.json
 
 `pictures` path-traces every mesh from 24 sides with Mitsuba 3, in its own colours under a sky and a lamp. `shapes` finds
-them with `dpr fit`, as a user would, and compares the solids.
+them with `dpr fit`, as a user would, and compares the solids. `wrong` spoils one view, and tells how well that view and
+the others are explained.
 """
 import argparse
+import copy
 import json
 import pathlib
 import resource
@@ -138,6 +141,51 @@ def find_shapes(arguments):
     arguments.output.write_text(json.dumps({"views": VIEWS, "cells": CELLS, "rows": rows}, indent=1) + "\n")
 
 
+# ---- Wrong views ----
+
+SPOILT = 5  # view
+
+
+def turned(view, degrees):
+    """The camera carried around the world's vertical axis."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[cosine, 0, sine, 0], [0, 1, 0, 0], [-sine, 0, cosine, 0], [0, 0, 0, 1]])
+    return (np.array(view) @ turn).tolist()
+
+
+def explained(arguments, views):
+    """What `dpr fit` says of every view."""
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    (arguments.work / "views.json").write_text(json.dumps(views))
+    subprocess.run([str(arguments.dpr), "fit", "--views", "views.json", "-o", "fit.obj", "--report", "report",
+                    "--quiet", *arguments.options.split()], check=True, cwd=arguments.work)
+    return json.loads((arguments.work / "report/fit.json").read_text())["views"]
+
+
+def spoil_views(arguments):
+    rows = []
+    folders = sorted(file.parent.resolve() for file in arguments.folder.glob("*/views.json"))
+    for folder, other in zip(folders, folders[1:] + folders[:1]):
+        right = json.loads((folder / "views.json").read_text())
+        for view in right["views"]:
+            view["image"] = str(folder / view["image"])
+        cases = {name: copy.deepcopy(right) for name in ("none", "turned by 5", "turned by 20", "another object's")}
+        for degrees in (5, 20):
+            camera = cases[f"turned by {degrees}"]["views"][SPOILT]["camera"]
+            camera["view"] = turned(camera["view"], degrees)
+        cases["another object's"]["views"][SPOILT]["image"] = str(other / f"{SPOILT:02}.exr")
+        for wrong, views in cases.items():
+            found = explained(arguments, views)
+            spoilt = found.pop(SPOILT)
+            parts = [view["unexplained_part"] for view in found]
+            rows.append({"shape": folder.name, "wrong": wrong, "iou": spoilt["iou"], "part": spoilt["unexplained_part"],
+                         "explained": spoilt["explained"], "others_iou": min(view["iou"] for view in found),
+                         "others_part": max(parts), "median_part": float(np.median(parts)),
+                         "others_unexplained": sum(not view["explained"] for view in found)})
+            print(rows[-1], flush=True)
+    arguments.output.write_text(json.dumps({"views": VIEWS, "spoilt": SPOILT, "rows": rows}, indent=1) + "\n")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
@@ -153,6 +201,13 @@ def main():
     shapes.add_argument("--options", default="", help="more options of dpr fit")
     shapes.add_argument("-o", "--output", type=pathlib.Path, required=True)
     shapes.set_defaults(run=find_shapes)
+    wrong = commands.add_parser("wrong")
+    wrong.add_argument("folder", type=pathlib.Path)
+    wrong.add_argument("--dpr", default="dpr", type=lambda name: pathlib.Path(name).resolve() if "/" in name else name)
+    wrong.add_argument("--options", default="", help="more options of dpr fit")
+    wrong.add_argument("--work", type=pathlib.Path, default=pathlib.Path("wrong_views"), help="folder for the fits")
+    wrong.add_argument("-o", "--output", type=pathlib.Path, required=True)
+    wrong.set_defaults(run=spoil_views)
     arguments = parser.parse_args()
     arguments.run(arguments)
 

@@ -99,6 +99,11 @@ struct ShapeOptions {
   /// start's squared lengths. Its faces have to stay: remesh_interval is 0 then.
   float rigidity = 0;
   unsigned checkpoint_interval = 50;  ///< > 0: iterations between two checkpoints
+  /// In (0, 1): a view counts as explained if silhouette and coverage share all but that part of their union, and if
+  /// colours leave less than that part of what the background alone leaves, as PoseOptions::explained; the square root
+  /// of that part if the loss is robust. Colours that leave eight times as much as those of the median view are
+  /// unexplained from a fifth of the part on. Where colours are not looked for, a silhouette decides alone.
+  float explained = 0.1F;
 };
 
 /// The smoothing at the finest level's end: that of the views, or else Gaussian noise of the pixel's position
@@ -118,12 +123,23 @@ struct ShapeIteration {
   std::vector<std::string> notes = {};  ///< a sentence for every device that was lost in it
 };
 
+/// How well a shape explains a view, from renders at the finest level's end; pixels count as the mask says.
+struct ViewExplanation {
+  /// Intersection over union of silhouette and coverage, where each is at least a half. None: the view has no
+  /// silhouette.
+  std::optional<double> iou;
+  /// Squared (or robust) colour difference in parts of what the background alone leaves.
+  double unexplained_part = 1;
+  bool explained = false;  ///< see ShapeOptions::explained
+};
+
 struct ShapeResult {
   Mesh start, mesh;                     ///< with vertex colours
   bool finished = false;                ///< false: the callback stopped it
   double seconds = 0;                   ///< of this run
   std::vector<ShapeIteration> history;  ///< also of the runs that it goes on from
   std::vector<Camera> cameras;  ///< [view] as given, or as ShapeOptions::refine_cameras has found them
+  std::vector<ViewExplanation> explanations = {};  ///< [view] of the mesh from these cameras
 };
 
 /// Finds a mesh with vertex colours that explains several images, on one device or on several, each with a

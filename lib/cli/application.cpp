@@ -1,6 +1,7 @@
 #include "cli/commands.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <string>
 #include <string_view>
@@ -175,6 +176,18 @@ InvalidArgument in_words_of_options(const CLI::App& application, const InvalidAr
           error.expected()};
 }
 
+/// Refuses empty words in the place of numbers: the options' library reads 0, or as if the option were not given.
+void refuse_empty_numbers(CLI::App& command) {
+  constexpr std::array<std::string_view, 4> k_numbers{"N", "FLOAT", "MiB", "SIZE"};
+  for (CLI::Option* option : command.get_options()) {
+    const std::string type = option->get_type_name();
+    if (std::ranges::find(k_numbers, type.substr(0, type.find(':'))) == k_numbers.end()) continue;
+    option->check(
+        CLI::Validator([](const std::string& word) { return std::string(word.empty() ? "empty" : ""); }, ""));
+  }
+  for (CLI::App* other : command.get_subcommands({})) refuse_empty_numbers(*other);
+}
+
 /// The program by its name, and its arguments, quoted where a shell needs it.
 std::string command_line(const CLI::App& application, int argc, char** argv) {
   constexpr const char* k_plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-";
@@ -197,6 +210,7 @@ int run(CLI::App& application, int argc, char** argv) {
     std::printf("%s", application.help().c_str());
     return 0;
   }
+  refuse_empty_numbers(application);
   try {
     application.parse(argc, argv);
     return 0;

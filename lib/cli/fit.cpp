@@ -12,6 +12,7 @@
 #include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "cli/commands.hpp"
+#include "cli/fit_explained.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/option_names.hpp"
 #include "cli/progress.hpp"
@@ -110,10 +111,6 @@ void check_outputs(const FitCommandOptions& options) {
   if (options.texture && extension == ".ply")
     throw InvalidArgument("--texture (command line)", "an output .ply, which holds no texture",
                           "a file .obj or .glb");
-  if (options.texture && (*options.texture < 1 || *options.texture > TextureAtlas::k_most_side)) {
-    throw InvalidArgument("--texture (command line)", checks::text(*options.texture),
-                          "a number of texels from 1 to " + std::to_string(TextureAtlas::k_most_side));
-  }
   require_writable(options.output);
   for (const std::string& file : {options.checkpoint, options.saved_views}) {
     if (!file.empty()) require_writable(file);
@@ -181,9 +178,9 @@ void tell_of_start(const ShapeSolver& solver, const ShapeViews& views, const Com
       common);
 }
 
-/// Writes the shape with a texture in the place of its colours.
-void write_textured(const FitCommandOptions& options, const std::vector<Device>& devices,
-                    const ShapeViews& views, const Mesh& mesh, const CommonOptions& common) {
+/// Gives the mesh a texture in the place of its colours, and writes it.
+ShapeTexture write_textured(const FitCommandOptions& options, const std::vector<Device>& devices,
+                            const ShapeViews& views, Mesh& mesh, const CommonOptions& common) {
   const auto start = Clock::now();
   const int side = std::max(*options.texture, TextureAtlas::least_side(mesh.faces.size()));
   if (side > *options.texture) {
@@ -198,12 +195,14 @@ void write_textured(const FitCommandOptions& options, const std::vector<Device>&
       progress.update(iteration + 1, format("texture  mean squared difference %.4e", loss));
       return true;
     };
-    write_mesh(options.output, find_texture(devices, views, mesh, side, watch));
+    mesh = find_texture(devices, views, mesh, side, watch);
   }
+  write_mesh(options.output, mesh);
   if (!common.quiet) {
     std::printf("%s: texture of %dx%d texels, mean squared difference %.4g, %.1f s\n", options.output.c_str(),
                 side, side, last, seconds_since(start));
   }
+  return {side, last};
 }
 
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
@@ -220,7 +219,8 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
                                                [&] { return ShapeSolver(devices, views, options.solver); });
   tell_of_start(solver, views, common);
   std::optional<FitReport> report;
-  if (!options.report.empty()) report.emplace(options.report, devices, views);
+  const std::vector<std::string> names = image_names(text);
+  if (!options.report.empty()) report.emplace(options.report, devices, views, names);
   std::exception_ptr report_failed;  // told once there is a mesh
   const auto keep = [&](const ShapeIteration& step, const Mesh& mesh) {
     try {
@@ -235,21 +235,29 @@ void run(const CLI::App& command, FitCommandOptions& options, const CommonOption
     print_notes(step.notes, common);
     return show(step, mesh);
   };
-  const ShapeResult result = solver.solve(watch, options.checkpoint);
+  ShapeResult result = solver.solve(watch, options.checkpoint);
   write_mesh(options.output, result.mesh);
   for (std::size_t i = 0; i < views.views.size(); ++i) views.views[i].camera = result.cameras[i];
   if (!options.saved_views.empty()) write_views(options.saved_views, {options.views, text}, views);
-  if (report_failed) std::rethrow_exception(report_failed);
-  if (report) {
-    const std::string views_file = std::filesystem::path(options.views).filename().string();
-    report->write(page_source("The shape in " + views_file, common, devices), result, common.quiet);
-  }
   if (!common.quiet) {
     std::printf("%s: %zu vertices, %zu triangles, loss %.4g after %zu iterations, %.1f s\n",
                 options.output.c_str(), result.mesh.positions.size(), result.mesh.faces.size(),
                 result.history.back().loss, result.history.size(), result.seconds);
+    const std::string unexplained = unexplained_text(result.explanations, names);
+    if (!unexplained.empty()) {
+      std::printf("%s. The image, its camera or the shape is wrong there%s.\n", unexplained.c_str(),
+                  options.solver.refine_cameras || names.size() < 2
+                      ? ""
+                      : ": --refine-cameras is for cameras a few pixels off");
+    }
   }
-  if (options.texture) write_textured(options, devices, views, result.mesh, common);
+  std::optional<ShapeTexture> texture;
+  if (options.texture) texture = write_textured(options, devices, views, result.mesh, common);
+  if (report_failed) std::rethrow_exception(report_failed);
+  if (report) {
+    const std::string views_file = std::filesystem::path(options.views).filename().string();
+    report->write(page_source("The shape in " + views_file, common, devices), result, texture, common.quiet);
+  }
 }
 
 void add_solver_options(CLI::App& command, FitCommandOptions& options) {
@@ -350,6 +358,7 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
   command
       ->add_option("--texture", options->texture,
                    "Texels a side of a texture that takes the place of the colours of vertices; OBJ and GLB")
+      ->check(CLI::Range(1, TextureAtlas::k_most_side))
       ->type_name("SIZE");
   command
       ->add_option("--save-views", options->saved_views,

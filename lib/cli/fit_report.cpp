@@ -8,6 +8,7 @@
 
 #include "base/output_file.hpp"
 #include "cli/difference.hpp"
+#include "cli/fit_explained.hpp"
 #include "cli/plot.hpp"
 #include "cli/progress.hpp"
 #include "cli/scene_file.hpp"
@@ -20,14 +21,22 @@
 namespace dpr::cli {
 namespace {
 
-constexpr std::size_t k_most_views = 8, k_iterations_kept = 11, k_turntable_views = 16;
+constexpr std::size_t k_most_views = 8, k_most_worst = 3, k_iterations_kept = 11, k_turntable_views = 16;
 
 /// Some of the views, at equal distances.
-std::vector<const ShapeView*> some_of(const std::vector<ShapeView>& views) {
-  const std::size_t count = std::min(k_most_views, views.size());
-  std::vector<const ShapeView*> chosen;
-  for (std::size_t i = 0; i < count; ++i) chosen.push_back(&views[i * views.size() / count]);
+std::vector<std::size_t> some_of(std::size_t views) {
+  const std::size_t count = std::min(k_most_views, views);
+  std::vector<std::size_t> chosen;
+  for (std::size_t i = 0; i < count; ++i) chosen.push_back(i * views / count);
   return chosen;
+}
+
+/// Those that are not explained, or the worst of all; not many.
+std::vector<std::size_t> worst_of(const std::vector<ViewExplanation>& views) {
+  const auto count = static_cast<std::size_t>(std::ranges::count(views, false, &ViewExplanation::explained));
+  std::vector<std::size_t> order = worst_first(views);
+  order.resize(std::clamp(count, std::size_t{1}, std::min(k_most_worst, views.size())));
+  return order;
 }
 
 /// Cameras around the mesh, which fills most of the short side of their pictures.
@@ -102,7 +111,8 @@ Json shape_to_json(const ShapeResult& result) {
           {"history", history}};
 }
 
-std::vector<TableRow> facts(const ShapeResult& result, const MeasuredDifferences& differences) {
+std::vector<TableRow> facts(const ShapeResult& result, const MeasuredDifferences& differences,
+                            const std::optional<ShapeTexture>& texture) {
   std::vector<TableRow> rows{{"vertices", std::to_string(result.mesh.positions.size())},
                              {"triangles", std::to_string(result.mesh.faces.size())}};
   if (!result.history.empty()) rows.push_back({"loss", format("%.4g", result.history.back().loss)});
@@ -110,6 +120,10 @@ std::vector<TableRow> facts(const ShapeResult& result, const MeasuredDifferences
   if (differences.depth) rows.push_back({"depths off by, mean", format("%.4g", *differences.depth)});
   if (differences.normal)
     rows.push_back({"normals' components off by, mean", format("%.4g", *differences.normal)});
+  if (texture) {
+    rows.push_back({"texture", format("%dx%d texels, mean squared difference %.4g", texture->side,
+                                      texture->side, texture->difference)});
+  }
   rows.push_back({"time of this run", format("%.1f seconds", result.seconds)});
   return rows;
 }
@@ -187,8 +201,9 @@ std::vector<Image> render_rigidly(const Device& device, const Mesh& mesh, const 
   return images;
 }
 
-FitReport::FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views)
-    : folder_(std::move(folder)), devices_(std::move(devices)), views_(views) {
+FitReport::FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views,
+                     std::vector<std::string> names)
+    : folder_(std::move(folder)), devices_(std::move(devices)), views_(views), names_(std::move(names)) {
   make_folder(folder_ / "iterations");
 }
 
@@ -251,38 +266,41 @@ std::vector<Picture> FitReport::frames(const ShapeResult& result) const {
   return pictures;
 }
 
-std::vector<std::vector<Picture>> FitReport::compare_views(const Mesh& mesh) const {
+std::vector<std::vector<Picture>> FitReport::compare_views(const ShapeResult& result,
+                                                           const std::vector<std::size_t>& views,
+                                                           const std::string& prefix) const {
   std::vector<Image> images;
   std::vector<Camera> cameras;
-  std::vector<std::string> numbers;
-  for (const ShapeView* view : some_of(views_.views)) {
-    images.push_back(view->image);
-    cameras.push_back(view->camera);
-    numbers.push_back("image " + std::to_string(view - views_.views.data()));
+  std::vector<std::string> numbers, explanations;
+  for (const std::size_t view : views) {
+    images.push_back(views_.views[view].image);
+    cameras.push_back(views_.views[view].camera);
+    numbers.push_back("image " + std::to_string(view) + ", " + names_[view]);
+    explanations.push_back("the shape from there: " + explanation_text(result.explanations[view]));
   }
-  const std::vector<Image> results = render(mesh, cameras);
+  const std::vector<Image> results = render(result.mesh, cameras);
   const Differences difference = differences(results, images);
-  const auto all = [&](const std::string& caption) {
-    return std::vector<std::string>(images.size(), caption);
-  };
-  const std::vector<Picture> targets = write_strip(folder_ / "targets.png", images, numbers);
-  const std::vector<Picture> shapes =
-      write_strip(folder_ / "results.png", results, all("the shape from there"));
+  const std::vector<std::string> captions(images.size(), difference.caption());
+  const std::vector<Picture> targets = write_strip(folder_ / (prefix + "targets.png"), images, numbers);
+  const std::vector<Picture> shapes = write_strip(folder_ / (prefix + "results.png"), results, explanations);
   const std::vector<Picture> gaps =
-      write_strip(folder_ / "differences.png", difference.images, all(difference.caption()));
+      write_strip(folder_ / (prefix + "differences.png"), difference.images, captions);
   std::vector<std::vector<Picture>> rows;
   for (std::size_t i = 0; i < targets.size(); ++i) rows.push_back({targets[i], shapes[i], gaps[i]});
   return rows;
 }
 
-void FitReport::write(const PageSource& source, const ShapeResult& result, bool quiet) const {
+void FitReport::write(const PageSource& source, const ShapeResult& result,
+                      const std::optional<ShapeTexture>& texture, bool quiet) const {
   const std::vector<Camera> around = turntable(result.mesh, k_turntable_views, views_.width, views_.height);
   std::vector<std::string> sides;
   for (std::size_t i = 0; i < around.size(); ++i)
     sides.push_back(
         format("%.0f degrees", 360.0 * static_cast<double>(i) / static_cast<double>(around.size())));
   // The page comes last: what it shows is there.
-  const std::vector<std::vector<Picture>> compared = compare_views(result.mesh);
+  const std::vector<std::vector<Picture>> compared = compare_views(result, some_of(views_.views.size()), ""),
+                                          worst =
+                                              compare_views(result, worst_of(result.explanations), "worst_");
   const Picture target = write_picture(folder_ / "target.png", views_.views.front().image, "image 0");
   const std::vector<Picture> iterations = frames(result);
   const std::vector<Picture> turns =
@@ -291,6 +309,7 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   Json numbers = shape_to_json(result);
   numbers["cameras"] = cameras_to_json(views_);
+  add_explanations(numbers, result.explanations, names_);
   const MeasuredDifferences differences = measured_differences(result.mesh);
   if (differences.depth) numbers["depth_difference"] = *differences.depth;
   if (differences.normal) numbers["normal_difference"] = *differences.normal;
@@ -303,12 +322,17 @@ void FitReport::write(const PageSource& source, const ShapeResult& result, bool 
     page.add_paragraph(format("%zu of the %zu images.", compared.size(), views_.views.size()));
   }
   page.add_player({}, compared);
+  page.add_heading("Images that are explained worst");
+  for (const std::vector<Picture>& row : worst) page.add_pictures(row);
+  page.add_heading("How well the shape explains each image");
+  if (texture) page.add_paragraph("These numbers are of the shape before its texture.");
+  page.add_table(explanation_rows(result.explanations, names_));
   page.add_heading("From the start to the end");
   page.add_player({target}, one_by_one(iterations));
   page.add_heading("All around");
   page.add_player({}, one_by_one(turns));
   page.add_heading("Result");
-  page.add_facts(facts(result, differences));
+  page.add_facts(facts(result, differences, texture));
   if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration");
   page.write(folder_ / "index.html");
 }

@@ -37,19 +37,28 @@ struct MeasuredDifferences {
   std::optional<double> depth, normal;
 };
 
+/// The texture that a shape was given in the place of its colours.
+struct ShapeTexture {
+  int side = 0;           ///< texels
+  double difference = 0;  ///< mean squared, of colours
+};
+
 /// The report's folder. The pictures of iterations are written while the solver works: an interrupted run
 /// leaves them, and a run that goes on from its checkpoint shows them too.
 class FitReport {
  public:
   /// Makes the folder if need be. Throws IoError. The first of the devices renders, or where it is lost the
   /// next; where all are, what is called throws DeviceError.
-  FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views);
+  FitReport(std::filesystem::path folder, std::vector<Device> devices, const ShapeViews& views,
+            std::vector<std::string> names);
 
   /// Writes iterations/N.png: the mesh as the first camera sees it. Throws IoError.
   void keep(unsigned iteration, const Mesh& mesh) const;
-  /// Writes targets, results, differences, turntable and plot (all PNG), fit.json with the history, and
-  /// index.html that shows them. All meshes are rendered rigidly. Throws IoError.
-  void write(const PageSource& source, const ShapeResult& result, bool quiet) const;
+  /// Writes targets, results, differences, the same of the images that are explained worst, turntable and plot (all
+  /// PNG), fit.json with the history, and index.html that shows them. All meshes are rendered rigidly. `texture`: of
+  /// the result's mesh. Throws IoError.
+  void write(const PageSource& source, const ShapeResult& result, const std::optional<ShapeTexture>& texture,
+             bool quiet) const;
 
  private:
   /// Returns the result of `work` on the first device that is not lost.
@@ -58,11 +67,15 @@ class FitReport {
   std::vector<Image> render(const Mesh& mesh, const std::vector<Camera>& cameras) const;
   MeasuredDifferences measured_differences(const Mesh& mesh) const;
   std::vector<Picture> frames(const ShapeResult& result) const;
-  std::vector<std::vector<Picture>> compare_views(const Mesh& mesh) const;
+  /// Target, shape and difference of each of these views; files begin with the prefix.
+  std::vector<std::vector<Picture>> compare_views(const ShapeResult& result,
+                                                  const std::vector<std::size_t>& views,
+                                                  const std::string& prefix) const;
 
   std::filesystem::path folder_;
   std::vector<Device> devices_;
   const ShapeViews& views_;
+  std::vector<std::string> names_;  // of the images
 };
 
 }  // namespace dpr::cli

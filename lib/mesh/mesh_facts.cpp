@@ -59,19 +59,27 @@ void look_at_edges(const Sides& sides, MeshFacts& facts, DisjointSets& corners) 
 
 void look_at_vertices(const Sides& sides, std::size_t vertices, MeshFacts& facts, DisjointSets& corners) {
   std::vector<std::uint8_t> fans(vertices, 0);
-  std::vector<bool> is_part(vertices);
-  DisjointSets parts(vertices);
-  for (const FaceSide& side : sides.list) parts.join(side.low, side.high);
   for (const FaceSide& side : sides.list) {
     // Each corner begins one side; its fan is counted where it is the fan's root, once.
     const std::uint32_t vertex = sides.faces[side.face()][side.corner()];
     if (corners.root(side.side) == side.side && fans[vertex] < 2) ++fans[vertex];
-    const std::uint32_t root = parts.root(vertex);
-    if (!is_part[root]) ++facts.components;
-    is_part[root] = true;
   }
   facts.non_manifold_vertices =
       static_cast<std::size_t>(std::ranges::count_if(fans, [](int n) { return n > 1; }));
+}
+
+/// Parts that share no position and are seen, for one of their faces has an area.
+std::size_t count_components(const Mesh& mesh, const std::vector<glm::uvec3>& faces) {
+  DisjointSets parts(mesh.positions.size());
+  for (const glm::uvec3& face : faces) {
+    parts.join(face.x, face.y);
+    parts.join(face.x, face.z);
+  }
+  std::vector<bool> is_part(mesh.positions.size());
+  for (const glm::uvec3& face : faces) {
+    if (has_area(mesh, face)) is_part[parts.root(face.x)] = true;
+  }
+  return static_cast<std::size_t>(std::ranges::count(is_part, true));
 }
 
 }  // namespace
@@ -97,6 +105,7 @@ MeshFacts mesh_facts(const Mesh& mesh) {
   DisjointSets corners(3 * sides.faces.size());
   look_at_edges(sides, facts, corners);
   look_at_vertices(sides, first.size(), facts, corners);
+  facts.components = count_components(mesh, sides.faces);
   return facts;
 }
 

@@ -13,7 +13,7 @@ struct MeshFacts {
   std::size_t distinct_positions = 0;
   std::size_t unused_vertices = 0;     ///< that no face refers to
   std::size_t faces_without_area = 0;  ///< exactly zero, equal corners among them
-  std::size_t components = 0;          ///< parts of faces that share no position
+  std::size_t components = 0;          ///< parts that share no position; with faces that have an area
   std::size_t edges = 0;
   std::size_t boundary_edges = 0;         ///< of one face
   std::size_t non_manifold_edges = 0;     ///< of more than two faces

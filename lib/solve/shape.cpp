@@ -21,6 +21,7 @@
 #include "solve/rigidity.hpp"
 #include "solve/shape_cameras.hpp"
 #include "solve/shape_checks.hpp"
+#include "solve/shape_explained.hpp"
 #include "solve/shape_level.hpp"
 #include "solve/shape_space.hpp"
 #include "solve/shape_state.hpp"
@@ -109,6 +110,17 @@ class Run {
       refine_cameras(gradient.views, in_level, rate * options_.camera_learning_rate);
     if (is_adaptive()) adapt(level, in_level, by_smoothing(finest_, gradient));
     ++state_.iteration;
+  }
+
+  /// How well the mesh explains every view, as it is now.
+  std::vector<ViewExplanation> explain() {
+    ShapeLevel level(views_, options_, options_.levels - 1);
+    level.set_cameras(state_.cameras);
+    renderer_.set_scene(scene_of_level(views_, level, state_.mesh(), finest_));
+    renderer_.set_views(level.views);
+    std::vector<Image> rendered = renderer_.render(), shown(rendered.size());
+    for (std::size_t i = 0; i < shown.size(); ++i) shown[level.order[i]] = std::move(rendered[i]);
+    return explain_views(views_, options_, shown);
   }
 
   /// With the optimizers' memories.
@@ -331,7 +343,8 @@ ShapeResult ShapeSolver::solve(const Callback& callback, const std::filesystem::
           end.iteration == most_iterations(),
           seconds_since(start),
           end.history,
-          moved_cameras(views_, end.cameras)};
+          moved_cameras(views_, end.cameras),
+          run.explain()};
 }
 
 }  // namespace dpr

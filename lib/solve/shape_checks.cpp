@@ -11,15 +11,12 @@
 #include "solve/shape_space.hpp"
 
 namespace dpr {
-namespace {
 
 bool compares_colors(const LossWeights& weights) {
   return std::ranges::any_of(image_losses(), [&](const ImageLossRow& loss) {
     return !loss.reads_alpha && weights.*loss.weight > 0;
   });
 }
-
-}  // namespace
 
 void check_shape_views(const ShapeViews& views) {
   if (views.views.empty()) throw InvalidArgument("views (shape)", "none", "at least one");
@@ -77,6 +74,7 @@ void check_shape_options(const ShapeOptions& o, const ShapeViews& views) {
   require(not_negative(o.depth), "depth (shape)", o.depth, "a finite number, at least 0");
   require(not_negative(o.normal), "normal (shape)", o.normal, "a finite number, at least 0");
   require(not_negative(o.rigidity), "rigidity (shape)", o.rigidity, "a finite number, at least 0");
+  require(o.explained > 0 && o.explained < 1, "explained (shape)", o.explained, "between 0 and 1");
   require(o.rigidity == 0 || o.remesh_interval == 0, "remesh_interval (shape)", o.remesh_interval,
           "0 beside a rigidity: it compares with the start, whose faces have to stay");
 }

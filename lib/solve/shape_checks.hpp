@@ -9,4 +9,7 @@ namespace dpr {
 void check_shape_views(const ShapeViews& views);
 void check_shape_options(const ShapeOptions& options, const ShapeViews& views);
 
+/// True if a loss compares colours, with any weight.
+bool compares_colors(const LossWeights& weights);
+
 }  // namespace dpr

@@ -200,9 +200,10 @@ TEST_SUITE("pipeline") {
     if (is_skipped()) return;
     const TempDir folder;
     write_inputs(folder);
-    const auto outcome = run_command(folder, with(k_short, {"--texture", "160"}));
+    const auto outcome = run_command(folder, with(k_short, {"--texture", "160", "--report", "report"}));
     CAPTURE(outcome.err);
     REQUIRE(outcome.status == 0);
+    CHECK(contains(folder.read("report/index.html"), "160x160 texels, mean squared difference"));
     const dpr::Mesh mesh = dpr::read_mesh(folder / "mesh.obj");
     REQUIRE(mesh.textures.size() == 1);
     CHECK(mesh.textures[0].width == 160);
@@ -213,7 +214,7 @@ TEST_SUITE("pipeline") {
     const dpr::Mesh least = dpr::read_mesh(folder / "mesh.obj");
     REQUIRE(least.textures.size() == 1);
     CHECK((least.textures[0].width > 4 && least.textures[0].width < 160));
-    for (const char* const side : {"0", "16385"}) {
+    for (const char* const side : {"0", "16385", ""}) {
       const auto refused = run_command(folder, with(k_short, {"--texture", side}));
       CHECK(refused.status == 1);
       CHECK(contains(refused.err, "from 1 to 16384"));
@@ -222,6 +223,53 @@ TEST_SUITE("pipeline") {
         run_command(folder, {"fit", "--views", "views.json", "-o", "mesh.ply", "--texture", "64"});
     CHECK(ply.status == 1);
     CHECK(contains(ply.err, ".obj or .glb"));
+  }
+
+  TEST_CASE("dpr fit tells which images are not explained, in one line, a file and a page") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    const std::vector<std::string> still =
+        with(k_short, {"--initial", "cube.ply", "--learning-rate", "1e-6", "--color-learning-rate", "0",
+                       "--report", "report"});
+    const auto right = run_command(folder, still);
+    CHECK(!contains(right.out, "not explained"));
+    CHECK(json::parse(folder.read("report/fit.json"))["explained"] == true);
+    views["views"][1]["camera"] = camera("[[0.34,0,0.94,0],[0,1,0,0],[-0.94,0,0.34,-5],[0,0,0,1]]");
+    folder.write("views.json", views.dump());
+    const auto wrong = run_command(folder, still);
+    CAPTURE(wrong.out);
+    CHECK(wrong.status == 0);
+    CHECK(wrong.err.empty());
+    CHECK(contains(wrong.out, "\n1 of 3 images is not explained: image 1 (view1.exr, IoU 0."));
+    CHECK(contains(wrong.out, "--refine-cameras is for cameras a few pixels off.\n"));
+    const json numbers = json::parse(folder.read("report/fit.json"));
+    CHECK(numbers["explained"] == false);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const json& view = numbers["views"][i];
+      CHECK(view["image"] == "view" + std::to_string(i) + ".exr");
+      CHECK(view["explained"] == (i != 1));
+      CHECK((view["iou"] > 0.9) == (i != 1));
+      CHECK(view["unexplained_part"] > 0);
+    }
+    const std::string page = folder.read("report/index.html");
+    CHECK(contains(page, "src=\"worst_differences.png\""));
+    CHECK(contains(page, "<td>view1.exr</td>"));
+    CHECK(run_command(folder, with(still, {"--quiet"})).out.empty());
+  }
+
+  TEST_CASE("dpr fit names the images that are explained worst, and counts the others") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    for (int i = 0; i < 3; ++i) views["views"].push_back(views["views"][i]);
+    for (json& view : views["views"]) view["camera"]["view"][2][3] = -3;
+    folder.write("views.json", views.dump());
+    const auto outcome =
+        run_command(folder, with(k_short, {"--initial", "cube.ply", "--learning-rate", "1e-6"}));
+    CAPTURE(outcome.out);
+    CHECK(contains(outcome.out, "6 of 6 images are not explained: image "));
+    CHECK(contains(outcome.out, "); and 3 others. The image"));
   }
 
   TEST_CASE("dpr fit tells of silhouettes that bound no shape") {
@@ -377,6 +425,9 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--schedule", "sometimes"}), "sometimes");
     fails(good, with(k_short, {"--blur", "0"}), "--blur (command line)");
     fails(good, with(k_short, {"--edge", "-1"}), "--edge (command line)");
+    fails(good, with(k_short, {"--laplacian", ""}),
+          "--laplacian (command line): got \"\", expected a number");
+    fails(good, with(k_short, {"--sigma", ""}), "--sigma (command line): got \"\", expected a number");
     fails(good, with(k_short, {"--blur-end", "0"}), "--blur-end (command line)");
     fails(good, with(k_short, {"--camera-learning-rate", "0"}), "--camera-learning-rate (command line)");
     fails(good, with(k_short, {"--save-views", "nowhere/views.json"}), "nowhere");

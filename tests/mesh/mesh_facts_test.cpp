@@ -81,9 +81,12 @@ TEST_SUITE("unit") {
   TEST_CASE("mesh facts: triangles without area, and nothing else") {
     const MeshFacts facts = facts_of({{0, 0, 1}, {5, 4, 6}});
     CHECK(facts.faces_without_area == 2);
+    CHECK(facts.components == 0);
     CHECK(facts.edges == 3);  // of the second, whose corners differ
     CHECK(facts_of({{0, 0, 0}}).components == 0);
     CHECK_FALSE(facts_of({{0, 0, 0}}).is_closed());
+    CHECK(facts_of({{0, 1, 2}, {5, 4, 6}}).components == 1);             // a part of no area is not seen
+    CHECK(facts_of({{0, 1, 3}, {5, 4, 6}, {2, 4, 3}}).components == 1);  // joined at 3 and 4
   }
 }
 
