@@ -233,6 +233,8 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   require_writable(options.output);
   check_scene_options(options);
   if (!options.views.empty()) return run_views(command, options, common);
+  if (options.moving)
+    throw InvalidArgument("--moving (command line)", "one without --views", "--views, which names pictures");
   std::optional<glm::dmat3> rotation;
   if (!options.initial_rotation.empty())
     rotation = rotation_from_vector(parse_vector(options.initial_rotation, k_turn));
@@ -345,19 +347,16 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
           "scene has them, in front of the objects or behind them. Needed where the scene has several meshes")
       ->allow_extra_args(false)
       ->type_name("N[,N...]");
-  CLI::Option* views =
-      command
-          ->add_option(
-              "--views", options->views,
-              "Pictures in place of --target, with cameras, masks, depths and silhouettes, in the format of "
-              "dpr fit: all show the object in the same pose")
-          ->type_name("V.json");
   command
-      ->add_flag(
-          "--moving", options->moving,
-          "The object has a pose of its own in each of the views, whose cameras say where it begins; --focal "
-          "and --distortion look for one focal length and lens of all")
-      ->needs(views);
+      ->add_option(
+          "--views", options->views,
+          "Pictures in place of --target, with cameras, masks, depths and silhouettes, in the format of "
+          "dpr fit: all show the object in the same pose")
+      ->type_name("V.json");
+  command->add_flag(
+      "--moving", options->moving,
+      "The object has a pose of its own in each of the views, whose cameras say where it begins; --focal "
+      "and --distortion look for one focal length and lens of all");
   add_camera_options(*command, *options);
   CLI::Option* initial =
       command

@@ -4,12 +4,15 @@
     venv/bin/python uncertainty.py pictures FOLDER --scenes tests/data/foreign/*.json
     venv/bin/python uncertainty.py photographs FOLDER --data examples/data      # of Debian's opencv-doc
     venv/bin/python uncertainty.py poses FOLDER --dpr build/release/bin/dpr -o uncertainty.json
+    venv/bin/python uncertainty.py together FOLDER --dpr build/release/bin/dpr -o calibration.json
 
 `pictures` path-traces meshes in unknown light with Mitsuba 3 (see foreign.py) and spoils them as cameras do: noise,
 blur, JPEG, clutter behind and something in front. `photographs` makes a board of coloured faces for each photograph
 of a chessboard, with the truth of OpenCV's calibration. Both write cases: NAME.json is the scene, NAME.png or .jpg
 the target, NAME.case the true pose. `poses` starts near the truth and compares errors with claimed deviations;
-then it starts half a turn away, where wrong poses come out, to see which are called explained.
+then it starts half a turn away, where wrong poses come out, to see which are called explained. `together` finds the
+photographs' poses and their camera in one run, from poses 20 degrees and a tenth of the distance off, with the right
+camera, with a focal length a tenth too long, and with that and no lens.
 """
 import argparse
 import io
@@ -288,6 +291,59 @@ def find_poses(arguments):
     summarize(rows)
 
 
+# ---- Photographs together ----
+
+MIDDLE = np.array([(SQUARES[0] - 2) / 2, (SQUARES[1] - 2) / 2, 0])  # of the board, about which starts are turned
+
+
+def view_of(file, camera, degrees):
+    """Of a views file: the photograph, and a camera in front of which the board begins that far off."""
+    case, random = json.loads(file.read_text()), np.random.default_rng([*file.stem.encode(), degrees])
+    axis = random.normal(size=3)
+    rotation = turn(np.radians(degrees) * axis / np.linalg.norm(axis)) @ case["rotation"]
+    place = (np.array(case["rotation"]) @ MIDDLE + case["translation"]) * (1 + 0.1 * random.choice([-1, 1]))
+    start = dict(camera, view=affine(rotation, place - rotation @ MIDDLE).tolist())
+    return {"image": str(file.with_suffix(".png").resolve()), "mask": str(file.with_suffix(".mask.png").resolve()),
+            "initial_camera": start}
+
+
+def find_together(arguments):
+    files = sorted(arguments.folder.glob("*.case"))
+    scene = json.loads(files[0].with_suffix(".json").read_text())
+    scene["meshes"][0].pop("transform")
+    truth, results = scene["camera"], []
+    for name, factor, options in (("camera known", 1, []), ("focal length", 1.1, ["--focal"]),
+                                  ("focal length and lens", 1.1, ["--focal", "--distortion"])):
+        camera = dict(truth, intrinsics={key: value * (factor if key[0] == "f" else 1)
+                                         for key, value in truth["intrinsics"].items()})
+        if "--distortion" in options:
+            camera.pop("distortion")
+        views = [view_of(file, camera, arguments.degrees) for file in files]
+        with tempfile.TemporaryDirectory() as folder:
+            scene_file, views_file, output = (pathlib.Path(folder) / n for n in ("scene.json", "views.json", "pose.json"))
+            scene_file.write_text(json.dumps(dict(scene, camera=camera)))
+            views_file.write_text(json.dumps({"width": scene["width"], "height": scene["height"], "views": views}))
+            subprocess.run([arguments.dpr, "pose", "--scene", scene_file, "--views", views_file, "--moving", "--translation",
+                            "--light", "gain", "--quiet", "-o", output, *options], check=True)
+            found = json.loads(output.read_text())
+        rows = []
+        for file, view, pose in zip(files, views, found["views"]):
+            case, to_camera = json.loads(file.read_text()), np.array(view["initial_camera"]["view"])
+            rotation = to_camera[:3, :3] @ pose["rotation_matrix"]
+            place = to_camera[:3, :3] @ pose["translation"] + to_camera[:3, 3]
+            rows.append({"case": file.stem, "explained": pose["explained"],
+                         "degrees": float(angle_degrees(rotation, np.array(case["rotation"]))),
+                         "translation": float(np.linalg.norm(place - case["translation"]))})
+        result = {"start": name, "focal_error": found["focal_scale"] * factor - 1, "views": rows}
+        if "--distortion" in options:
+            result["k1_error"] = found["views"][0]["distortion"][0] / truth["distortion"][0] - 1
+        results.append(result)
+        print(name, f"{sum(row['degrees'] < 0.5 for row in rows)} of {len(rows)} below 0.5 degrees, largest "
+              f"{max(row['degrees'] for row in rows):.2f} and {max(row['translation'] for row in rows):.3f} squares,",
+              {key: f"{value:.4f}" for key, value in result.items() if key.endswith("error")}, flush=True)
+    arguments.output.write_text(json.dumps(results, indent=1) + "\n")
+
+
 def summarize(rows):
     for kind in sorted({row["kind"] for row in rows}) + ["all"]:
         of_kind = [row for row in rows if kind in ("all", row["kind"])]
@@ -326,7 +382,12 @@ def main():
     poses.add_argument("--options", default="", help="further ones of dpr pose, in one word")
     poses.add_argument("--wrong", action="store_true", help="start half a turn away")
     poses.add_argument("-o", "--output", type=pathlib.Path, required=True)
-    for command in (pictures, photographs, poses):
+    together = commands.add_parser("together")
+    together.set_defaults(run=find_together)
+    together.add_argument("--dpr", default="dpr")
+    together.add_argument("--degrees", type=int, default=20, help="that starts are off")
+    together.add_argument("-o", "--output", type=pathlib.Path, required=True)
+    for command in (pictures, photographs, poses, together):
         command.add_argument("folder", type=pathlib.Path)
     arguments = parser.parse_args()
     arguments.run(arguments)
