@@ -66,6 +66,10 @@ void PoseLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   for (PictureLevel& picture : pictures_) picture.weigh_observations(hypotheses);
 }
 
+bool PoseLevel::has_observations() const {
+  return std::ranges::any_of(pictures_, &PictureLevel::has_observations);
+}
+
 std::vector<LossScales> PoseLevel::scales() const {
   std::vector<LossScales> result;
   for (const PictureLevel& picture : pictures_) result.push_back(picture.scales());

@@ -39,7 +39,7 @@ class PoseLevel {
 
   void estimate_scale(std::span<const Hypothesis> hypotheses);
   void weigh_observations(std::span<const Hypothesis> hypotheses);
-  bool has_observations() const { return pictures_.front().has_observations(); }
+  bool has_observations() const;
   /// [picture]
   std::vector<LossScales> scales() const;
   void set_scales(const std::vector<LossScales>& scales);

@@ -3,10 +3,13 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
-#include <string>
+#include <span>
+#include <tuple>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "base/checks.hpp"
 #include "base/clock.hpp"

@@ -103,8 +103,8 @@ FittedPose Fit::run() {
     descend(shapes, *found);
     choose_normals(shapes[shapes.size() - 2]);
   }
-  const LevelShape final = final_shape(shapes.back());
-  PoseLevel level = make_level(final, light_);
+  const LevelShape finest = final_shape(shapes.back());
+  PoseLevel level = make_level(finest, light_);
   rescale(level);
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
@@ -125,7 +125,7 @@ FittedPose Fit::run() {
     result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
   }
   result_.explained = result_.doubt == PoseDoubt::none;
-  return {std::move(result_), normals_, level.color_scale(), final.samples,
+  return {std::move(result_), normals_, level.color_scale(), finest.samples,
           blank > 0 ? unexplained / blank : 1};
 }
 
