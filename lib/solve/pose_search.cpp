@@ -56,6 +56,7 @@ class Fit {
 
   std::optional<Found> descend(const std::vector<LevelShape>& shapes, const Found& found);
   void add_others(PoseLevel& level, const std::vector<Candidate>& found);
+  void add_initial();
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
   void choose_normals(const LevelShape& shape);
   LevelShape final_shape(LevelShape shape) const;
@@ -106,6 +107,7 @@ FittedPose Fit::run() {
   const LevelShape finest = final_shape(shapes.back());
   PoseLevel level = make_level(finest, light_);
   rescale(level);
+  add_initial();
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
   if (anywhere_) try_half_turns(level);
@@ -158,6 +160,12 @@ void Fit::add_others(PoseLevel& level, const std::vector<Candidate>& found) {
   add_half_turns(candidates_, half_turns_, method_.rotations > 0 ? std::min(own, k_turned) : 0);
   candidates_.insert(candidates_.end(), found.begin(), found.end());
   drop_hopeless_at(level, candidates_, own, k_hope, wrong_);
+}
+
+/// Adds the initial poses as they were given: coarse images may have led away from one that was nearly right.
+void Fit::add_initial() {
+  if (anywhere_) return;
+  for (const Pose& pose : initial_) candidates_.push_back({{pose}});
 }
 
 /// The best pose after half a turn about each axis, refined where it explains anything.
