@@ -219,11 +219,11 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
     }
   }
   choose_method(command, options);
+  const SceneOfViews in = read_scene_of_views(options.scene, options.views, common);
   with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
-    find_poses_in_views(
-        {options.scene, options.views, options.output, options.report, options.meshes, options.moving,
-         options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
-        common);
+    find_poses_in_views({options.views, options.output, options.report, options.meshes, options.moving,
+                         options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
+                        in, common);
     return 0;
   });
 }
@@ -355,8 +355,8 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
       ->type_name("V.json");
   command->add_flag(
       "--moving", options->moving,
-      "The object has a pose of its own in each of the views, whose cameras say where it begins; --focal "
-      "and --distortion look for one focal length and lens of all");
+      "The object has a pose of its own in each of the views: it begins where the scene has it, before that "
+      "view's camera. --focal and --distortion look for one focal length and lens of all");
   add_camera_options(*command, *options);
   CLI::Option* initial =
       command

@@ -20,24 +20,15 @@
 namespace dpr::cli {
 namespace {
 
-/// A picture's alpha is the silhouette in a views file.
-Image silhouette_of(const ShapeView& view) {
-  if (!view.has_alpha) return {};
-  Image silhouette = view.image;
-  for (glm::vec4& pixel : silhouette.pixels) pixel = glm::vec4(pixel.w);
-  return silhouette;
-}
-
-std::vector<PoseView> pose_views(ShapeViews views, const std::string& file, bool takes_silhouettes) {
+/// A silhouette tells in the colours alone: the picture is laid on the background where it says so.
+std::vector<PoseView> pose_views(ShapeViews views, const std::string& file) {
   std::vector<PoseView> result;
   for (ShapeView& view : views.views) {
     if (view.knowledge == CameraKnowledge::unknown) {
       throw InvalidArgument(checks::element("views", result.size()) + " (" + file + ")", "no camera",
                             "a \"camera\", or an \"initial_camera\" that is near");
     }
-    Image silhouette = takes_silhouettes ? silhouette_of(view) : Image{};
-    result.push_back({view.camera, std::move(view.image), std::move(view.mask), std::move(silhouette),
-                      std::move(view.depth)});
+    result.push_back({view.camera, std::move(view.image), std::move(view.mask), {}, std::move(view.depth)});
   }
   return result;
 }
@@ -80,7 +71,12 @@ Json views_to_json(const FoundViews& views) {
   return json;
 }
 
-void print_moving(const FoundViews& views, const std::string& output) {
+/// What may help views that are not explained, after a full stop.
+const char* advice(const PoseOptions& solver) {
+  return solver.solve_translation ? "" : " --translation looks for places too.";
+}
+
+void print_moving(const FoundViews& views, const std::string& output, const PoseOptions& solver) {
   std::size_t explained = 0;
   for (std::size_t i = 0; i < views.found.size(); ++i) {
     const PoseResult& result = views.found[i].result;
@@ -88,26 +84,30 @@ void print_moving(const FoundViews& views, const std::string& output) {
     if (!result.explained)
       std::printf("View %zu is not explained: %s. Its pose may be wrong.\n", i, doubt_text(result).c_str());
   }
-  std::printf("%s: %zu of %zu views are explained\n", output.c_str(), explained, views.found.size());
+  const bool are_all = explained == views.found.size();
+  std::printf("%s: %zu of %zu views are explained.%s\n", output.c_str(), explained, views.found.size(),
+              are_all ? "" : advice(solver));
 }
 
-void print_still(const PoseResult& result, const std::string& output) {
+void print_still(const PoseResult& result, const std::string& output, const PoseOptions& solver) {
   std::printf("%s: loss %.6g after %u iterations, %.1f s\n", output.c_str(), result.loss, result.iterations,
               result.seconds);
   if (result.explained) return;
-  std::printf("The views are not explained: %s. The pose may be wrong", doubt_text(result).c_str());
-  if (!result.view_parts.empty()) {
-    const auto worst = std::ranges::max_element(result.view_parts);
-    std::printf("; view %td leaves most", worst - result.view_parts.begin());
-  }
-  std::printf(".\n");
+  std::string parts;
+  for (const double part : result.view_parts) parts += (parts.empty() ? "" : ", ") + format("%.3g", part);
+  std::printf("The views are not explained: %s. The pose, or the camera of a view, may be wrong.%s\n",
+              doubt_text(result).c_str(), advice(solver));
+  if (!parts.empty())
+    std::printf("Errors of the views, in parts of a picture without the object: %s\n", parts.c_str());
 }
 
-/// The views' scene, of their size.
-Scene read_scene_of(const PoseViewsOptions& options, const ShapeViews& views, const CommonOptions& common) {
-  Scene scene = read_scene(options.scene, common, glm::ivec2(views.width, views.height));
+/// The scene in the views' size, and before their background if they have one.
+Scene read_scene_of(const std::string& file, const ShapeViews& views, bool has_background,
+                    const CommonOptions& common) {
+  Scene scene = read_scene(file, common, glm::ivec2(views.width, views.height));
   scene.width = views.width;
   scene.height = views.height;
+  if (has_background) scene.background = views.background;
   return scene;
 }
 
@@ -127,18 +127,25 @@ std::vector<PoseResult> solve(const PoseViewsOptions& options, const PoseOptions
 
 }  // namespace
 
-void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& common) {
+SceneOfViews read_scene_of_views(const std::string& scene_file, const std::string& views_file,
+                                 const CommonOptions& common) {
   Notes notes;
-  ShapeViews read = parse_views_file(options.views, read_file(options.views), notes, common.encoding()).views;
+  const std::string text = read_file(views_file);
+  ShapeViews views = parse_views_file(views_file, text, notes, common.encoding()).views;
   print_notes(notes, common);
-  const Scene scene = read_scene_of(options, read, common);
+  const bool has_background = Json::parse(text).contains("background");
+  Scene scene = read_scene_of(scene_file, views, has_background, common);
+  return {std::move(scene), pose_views(std::move(views), views_file)};
+}
+
+void find_poses_in_views(const PoseViewsOptions& options, const SceneOfViews& in,
+                         const CommonOptions& common) {
+  const auto& [scene, views] = in;
   const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
   if (bodies.size() > 1)
     throw InvalidArgument("--mesh (command line)", "several beside --views", "one: the meshes of one object");
   PoseOptions solver = options.solver;
   solver.meshes = bodies.front();
-  const bool is_alone = scene.meshes.size() == std::max<std::size_t>(1, solver.meshes.size());
-  const std::vector<PoseView> views = pose_views(std::move(read), options.views, is_alone);
   const Device device = open_device(common);
   std::vector<PoseResult> results = solve(options, solver, device, scene, views, common.quiet);
   FoundViews found{options.moving, {}, {}, {}};
@@ -160,9 +167,9 @@ void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& c
   }
   if (common.quiet) return;
   if (options.moving) {
-    print_moving(found, options.output);
+    print_moving(found, options.output, solver);
   } else {
-    print_still(found.found.front().result, options.output);
+    print_still(found.found.front().result, options.output, solver);
   }
 }
 

@@ -9,9 +9,19 @@
 
 namespace dpr::cli {
 
+/// A scene and the pictures that show it.
+struct SceneOfViews {
+  Scene scene;  ///< of the views' size, and before their background where their file has one
+  std::vector<PoseView> views;
+};
+
+/// Throws IoError and InvalidArgument in the words of the files.
+SceneOfViews read_scene_of_views(const std::string& scene_file, const std::string& views_file,
+                                 const CommonOptions& common);
+
 /// What the options of dpr pose say of a fit in several pictures.
 struct PoseViewsOptions {
-  std::string scene, views, output, report;
+  std::string views, output, report;
   std::vector<std::string> meshes;
   bool moving = false;
   PoseStart start = PoseStart::scene;
@@ -20,6 +30,7 @@ struct PoseViewsOptions {
 
 /// Finds the poses, writes them and their reports, a folder for each picture, and says how well they explain the
 /// pictures. Throws as the command does.
-void find_poses_in_views(const PoseViewsOptions& options, const CommonOptions& common);
+void find_poses_in_views(const PoseViewsOptions& options, const SceneOfViews& in,
+                         const CommonOptions& common);
 
 }  // namespace dpr::cli

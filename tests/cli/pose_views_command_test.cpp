@@ -85,6 +85,21 @@ TEST_SUITE("pipeline") {
     CHECK(contains(folder.read("page/1/index.html"), "The pose in view 1 of views.json"));
   }
 
+  TEST_CASE("dpr pose --views: the background is the views file's, and the views' errors are told") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    json views = json::parse(folder.read("views.json"));
+    views["background"] = {0.5, 0.5, 0.5};
+    folder.write("views.json", views.dump());
+    const Outcome outcome = run_line(
+        folder, "pose --scene scene.json --views views.json --translation --rotations 0 -o pose.json");
+    REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
+    CHECK(contains(outcome.out, "The views are not explained"));  // whose pictures are black there
+    CHECK(contains(outcome.out, "Errors of the views, in parts of a picture without the object: "));
+    CHECK_FALSE(json::parse(folder.read("pose.json"))["explained"].get<bool>());
+  }
+
   TEST_CASE("dpr pose --views --moving --focal: a pose in each picture, and one focal length") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -94,7 +109,7 @@ TEST_SUITE("pipeline") {
                  "pose --scene scene.json --views moving.json --moving --focal --translation "
                  "--rotations 0 -o pose.json");
     REQUIRE_MESSAGE(outcome.status == 0, outcome.err);
-    CHECK(contains(outcome.out, "pose.json: 2 of 2 views are explained"));
+    CHECK(contains(outcome.out, "pose.json: 2 of 2 views are explained."));
     const json found = json::parse(folder.read("pose.json"));
     const double truth = std::tan(56 * M_PI / 360) / std::tan(60 * M_PI / 360);
     CHECK(found["focal_scale"].get<double>() == doctest::Approx(truth).epsilon(0.01));
@@ -122,6 +137,8 @@ TEST_SUITE("pipeline") {
     check_refused("--target front.png --moving", "--views");
     folder.write("views.json", R"({"width": 72, "height": 64, "views": [{"image": "front.png"}]})");
     check_refused("--views views.json", "views[0]");
+    folder.write("views.json", R"({"width": 48, "height": 40, "views": []})");
+    check_refused("--views views.json", "views.json");
   }
 }
 
