@@ -25,7 +25,8 @@ namespace dpr {
 namespace {
 
 const Mesh& template_of(const ShapeViews& views) {
-  if (!views.initial) throw InvalidArgument("initial mesh (photographs)", "none", "a template");
+  if (!views.initial)
+    throw InvalidArgument("initial mesh (photographs)", "none", "a template, or a camera in every view");
   validate(*views.initial, "initial (photographs)");
   return *views.initial;
 }
