@@ -298,9 +298,8 @@ void FitReport::write(const PageSource& source, const ShapeResult& result,
     sides.push_back(
         format("%.0f degrees", 360.0 * static_cast<double>(i) / static_cast<double>(around.size())));
   // The page comes last: what it shows is there.
-  const std::vector<std::vector<Picture>> compared = compare_views(result, some_of(views_.views.size()), ""),
-                                          worst =
-                                              compare_views(result, worst_of(result.explanations), "worst_");
+  const auto compared = compare_views(result, some_of(views_.views.size()), "");
+  const auto worst = compare_views(result, worst_of(result.explanations), "worst_");
   const Picture target = write_picture(folder_ / "target.png", views_.views.front().image, "image 0");
   const std::vector<Picture> iterations = frames(result);
   const std::vector<Picture> turns =

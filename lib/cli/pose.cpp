@@ -224,7 +224,6 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
     find_poses_in_views({options.views, options.output, options.report, options.meshes, options.moving,
                          options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
                         in, common);
-    return 0;
   });
 }
 

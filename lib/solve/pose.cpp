@@ -49,39 +49,6 @@ const LeastSquares& require_least_squares(const PoseOptions& options, const char
   return *method;
 }
 
-/// Throws for what cannot be solved.
-void validate(const Scene& scene, const Image& target, const PoseOptions& options) {
-  validate_meshes(scene, options.meshes);
-  validate(scene);
-  const auto* least_squares = std::get_if<LeastSquares>(&options.method);
-  if (!target.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares)) {
-    require_size(target, scene, "target");
-    checks::require_pixels(target, "target (pose)");
-  }
-  require(options.explained > 0 && options.explained < 1, "explained (pose)", options.explained,
-          "a number in (0, 1)");
-  if (options.solve_focal) require_least_squares(options, "focal length (pose)");
-  if (options.solve_distortion) {
-    require_least_squares(options, "distortion (pose)");
-    if (scene.camera.orthographic_height)
-      throw InvalidArgument("distortion (pose)", "an orthographic camera", "a perspective one, with a lens");
-  }
-  if (options.solve_translation && scene.camera.orthographic_height) {
-    throw InvalidArgument("translation (pose)", "an orthographic camera, which shows nothing of the depth",
-                          "a perspective one, or a rotation to look for alone");
-  }
-  std::visit([&](const auto& method) { validate(method, scene); }, options.method);
-  const bool stands = scene.meshes.size() > std::max<std::size_t>(1, options.meshes.size());
-  if (stands && least_squares != nullptr && !least_squares->silhouette.image.pixels.empty()) {
-    throw InvalidArgument("silhouette (pose)", "one in a scene where meshes stand still",
-                          "colours or depths, which show these too");
-  }
-  const std::size_t first = options.meshes.empty() ? 0 : options.meshes.front();
-  const double determinant = glm::determinant(glm::dmat3(scene.meshes[first].transform));
-  require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,
-          "a value other than 0");
-}
-
 template <typename Work>
 PoseResult timed(const Work& work) {
   const auto start = Clock::now();
@@ -95,23 +62,53 @@ PoseResult timed(const Work& work) {
 
 PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options)
     : device_(std::move(device)), scene_(std::move(scene)), target_(target), options_(std::move(options)) {
-  validate(scene_, target_, options_);
+  validate_meshes(scene_, options_.meshes);
+  validate(scene_);
+  const auto* least_squares = std::get_if<LeastSquares>(&options_.method);
+  if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares)) {
+    require_size(target_, scene_, "target");
+    checks::require_pixels(target_, "target (pose)");
+  }
+  require(options_.explained > 0 && options_.explained < 1, "explained (pose)", options_.explained,
+          "a number in (0, 1)");
+  if (options_.solve_focal) require_least_squares(options_, "focal length (pose)");
+  if (options_.solve_distortion) {
+    require_least_squares(options_, "distortion (pose)");
+    if (scene_.camera.orthographic_height)
+      throw InvalidArgument("distortion (pose)", "an orthographic camera", "a perspective one, with a lens");
+  }
+  if (options_.solve_translation && scene_.camera.orthographic_height) {
+    throw InvalidArgument("translation (pose)", "an orthographic camera, which shows nothing of the depth",
+                          "a perspective one, or a rotation to look for alone");
+  }
+  std::visit([&](const auto& method) { validate(method, scene_); }, options_.method);
+  const bool stands = scene_.meshes.size() > std::max<std::size_t>(1, options_.meshes.size());
+  if (stands && least_squares != nullptr && !least_squares->silhouette.image.pixels.empty()) {
+    throw InvalidArgument("silhouette (pose)", "one in a scene where meshes stand still",
+                          "colours or depths, which show these too");
+  }
+  const std::size_t first = options_.meshes.empty() ? 0 : options_.meshes.front();
+  const double determinant = glm::determinant(glm::dmat3(scene_.meshes[first].transform));
+  require(std::abs(determinant) > 0, "determinant of the transform (pose)", determinant,
+          "a value other than 0");
 }
 
 PoseSolver PoseSolver::of_views(Device device, const Scene& scene, const std::vector<PoseView>& views,
                                 const PoseOptions& options) {
   require_views(views, options);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const PoseProblem problem = problem_of(views[i], scene, options);
+  const auto solver_of = [&](std::size_t i) {
+    PoseProblem problem = problem_of(views[i], scene, options);
     try {
-      validate(problem.scene, problem.target, problem.options);
+      return PoseSolver(device, std::move(problem.scene), problem.target, std::move(problem.options));
     } catch (const InvalidArgument& e) {
       throw InvalidArgument(checks::element("views", i) + ": " + e.argument(), e.got(), e.expected());
     }
+  };
+  PoseSolver solver = solver_of(0);
+  for (std::size_t i = 1; i < views.size(); ++i) {
+    solver_of(i);
+    solver.others_.push_back(views[i]);
   }
-  PoseProblem first = problem_of(views.front(), scene, options);
-  PoseSolver solver(std::move(device), std::move(first.scene), first.target, std::move(first.options));
-  solver.others_.assign(std::next(views.begin()), views.end());
   return solver;
 }
 

@@ -154,13 +154,10 @@ bool JointSystem::refine(unsigned iterations, const std::function<bool()>& repor
     std::optional<Eigen::VectorXd> all = step(damping);
     while (!all && damping < k_most_damping) all = step(damping *= k_damping_rise);
     if (!all) return true;
-    double longest = 0, pixel = 0;
-    for (Eigen::Index i = 0; i < std::ssize(views_); ++i) {
-      const JointView& view = views_[static_cast<std::size_t>(i)];
-      longest = std::max(longest, view.space.length(step_of(*all, i)));
-      pixel = view.level->pixel_ndc();
-    }
-    if (longest < k_still_pixels * pixel) return true;
+    double longest = 0;
+    for (Eigen::Index i = 0; i < std::ssize(views_); ++i)
+      longest = std::max(longest, views_[static_cast<std::size_t>(i)].space.length(step_of(*all, i)));
+    if (longest < k_still_pixels * views_.front().level->pixel_ndc()) return true;
     if (longest > k_longest_step_ndc) *all *= k_longest_step_ndc / longest;
     std::vector<std::pair<Hypothesis, NormalEquations>> moved;
     double loss = 0;
@@ -248,8 +245,7 @@ std::vector<PoseResult> MovingFit::run() {
     if (which.empty()) {
       for (std::size_t i = 0; i < views_.size(); ++i) which.push_back(i);
     }
-    const bool is_last = which == last && difference(camera_, before) < k_same;
-    if (is_last) break;
+    if (which == last && difference(camera_, before) < k_same) break;
     before = camera_;
     fit_together(which, round == 0);
     for (std::size_t i = 0; i < views_.size(); ++i) fit_again(i, std::ranges::count(which, i) > 0);
