@@ -147,7 +147,7 @@ struct PoseIteration {
   Pose pose;                  ///< of the best
   double focal_scale = 1;     ///< of the best
   dvec2 radial{0.0};          ///< of the best
-  std::size_t body = 0;       ///< number of the body, of several
+  std::size_t body = 0;       ///< number of the body, of several; of the view, where the object moves
 };
 
 /// Why a pose does not count as explaining the target: what leaves little more than it.
@@ -195,8 +195,8 @@ struct PoseResult : PoseHypothesis {
   std::vector<PoseIteration> history;
 };
 
-/// A picture of an object, the camera that took it, and what else was observed in it, all of the scene's size. Images are
-/// as LeastSquares has them; any of target, silhouette and depth will do without the others.
+/// A picture of an object, the camera that took it, and what else was observed in it, all of the scene's size.
+/// Images are as LeastSquares has them; any of target, silhouette and depth will do without the others.
 struct PoseView {
   Camera camera;
   Image target;
