@@ -106,6 +106,19 @@ void linearize(PoseLevel& level, std::vector<Candidate>& candidates) {
   }
 }
 
+/// Takes the steps that lower the loss, and finds nothing else of them.
+void judge_alone(PoseLevel& level, const std::vector<Candidate*>& moving,
+                 const std::vector<Hypothesis>& hypotheses) {
+  const std::vector<double> losses = level.losses(hypotheses);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    if (losses[i] < moving[i]->equations.loss) {
+      moving[i]->hypothesis = hypotheses[i];
+      moving[i]->equations = {.loss = losses[i]};
+    }
+    moving[i]->restart();
+  }
+}
+
 double least_loss(const std::vector<Candidate>& candidates) {
   const auto loss = [](const Candidate& candidate) { return candidate.equations.loss; };
   return std::ranges::min(candidates, {}, loss).equations.loss;
@@ -170,6 +183,10 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
       hypotheses.push_back(space.moved(candidate.hypothesis, step));
     }
     if (moving.empty()) break;
+    if (turns.is_end && iteration + 1 == turns.most) {
+      judge_alone(level, moving, hypotheses);
+      break;
+    }
     const std::vector<NormalEquations> equations = level.linearize(hypotheses);
     for (std::size_t i = 0; i < moving.size(); ++i) {
       const double fall = moving[i]->equations.loss - equations[i].loss;

@@ -165,7 +165,7 @@ Candidate PoseTracker::Impl::follow_from(std::size_t level, const Pose& pose) {
   for (; level < levels->size(); ++level) {
     const unsigned steps = level + 1 < levels->size() ? k_coarse_steps : k_fine_steps;
     one.front().restart();
-    refine(levels->at(level), levels->space(), one, {steps, steps}, k_go_on);
+    refine(levels->at(level), levels->space(), one, {steps, steps, true}, k_go_on);
   }
   return one.front();
 }
