@@ -6,7 +6,7 @@ dpr_packages_demo=(
   g++ cmake ninja-build
   pocl-opencl-icd ocl-icd-opencl-dev opencl-clhpp-headers
   libglm-dev libeigen3-dev libopenmesh-dev libopenimageio-dev libpng-dev nlohmann-json3-dev libcli11-dev
-  gnuplot-nox
+  gnuplot-nox libjs-three
 )
 # The tests, the reference manual, and Debian packages by cpack. Where a release has no clang-19, a test is skipped.
 dpr_packages_tests=(

@@ -59,7 +59,7 @@ std::vector<Camera> turntable(const Mesh& mesh, std::size_t count, int width, in
   return cameras;
 }
 
-bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIteration>& history) {
+Plot shape_plot(const std::vector<ShapeIteration>& history) {
   constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
   std::vector<double> x;
   Curve image{"images", {}}, mesh{"regularisers", {}}, sigma{"sigma", {}}, gamma{"gamma", {}},
@@ -76,10 +76,41 @@ bool plot_history(const std::filesystem::path& file, const std::vector<ShapeIter
   const bool is_regularised =
       std::ranges::any_of(history, [](const auto& step) { return step.mesh_loss > 0; });
   if (is_regularised) losses.push_back(mesh);
-  return plot(file, "iteration", x,
-              {{"Loss at the level's resolution", "loss", true, losses},
-               {"Smoothing", "scale", true, {sigma, gamma}},
-               {"Vertices of the mesh", "vertices", false, {vertices}}});
+  return {"iteration",
+          x,
+          {{"Loss at the level's resolution", "loss", true, losses},
+           {"Smoothing", "scale", true, {sigma, gamma}},
+           {"Vertices of the mesh", "vertices", false, {vertices}}}};
+}
+
+/// The shape, and the cameras of its views before it.
+Model shape_model(const ShapeResult& result, const ShapeViews& views, const std::vector<std::string>& names) {
+  constexpr float k_depth = 0.15F;  // of the way to the shape
+  Model model;
+  model.heading = "The shape, to turn by hand";
+  add_mesh(model, result.mesh);
+  model.pivot = center(bounding_box(model.positions));
+  bool are_all_explained = true;
+  for (std::size_t i = 0; i < views.views.size(); ++i) {
+    const bool is_explained = result.explanations[i].explained;
+    are_all_explained = are_all_explained && is_explained;
+    const Camera& camera = views.views[i].camera;
+    const float distance = glm::length(glm::vec3(camera.view * glm::vec4(model.pivot, 1)));
+    model.cameras.push_back(
+        {.camera = camera,
+         .width = views.width,
+         .height = views.height,
+         .depth = k_depth * distance,
+         .label = std::to_string(i),
+         .name = "image " + std::to_string(i) + ", " + names[i] + (is_explained ? "" : ", not explained"),
+         .stands_out = !is_explained});
+  }
+  model.caption = "The shape and the cameras of the images, by number.";
+  if (!are_all_explained) model.caption += " Those whose image is not explained are red.";
+  if (!result.mesh.textures.empty()) model.caption += " The texture is shown as one colour a vertex.";
+  model.up = common_up(model.cameras);
+  model.start = overview(model);
+  return model;
 }
 
 /// As scenes and views have them.
@@ -304,7 +335,8 @@ void FitReport::write(const PageSource& source, const ShapeResult& result,
   const std::vector<Picture> iterations = frames(result);
   const std::vector<Picture> turns =
       write_strip(folder_ / "turntable.png", render(result.mesh, around), sides);
-  const bool is_plotted = !result.history.empty() && plot_history(folder_ / "plot.png", result.history);
+  const Plot curves = shape_plot(result.history);
+  const bool is_plotted = !result.history.empty() && plot(folder_ / "plot.png", curves);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
   Json numbers = shape_to_json(result);
   numbers["cameras"] = cameras_to_json(views_);
@@ -328,11 +360,12 @@ void FitReport::write(const PageSource& source, const ShapeResult& result,
   page.add_table(explanation_rows(result.explanations, names_));
   page.add_heading("From the start to the end");
   page.add_player({target}, one_by_one(iterations));
+  page.add_model(shape_model(result, views_, names_));
   page.add_heading("All around");
   page.add_player({}, one_by_one(turns));
   page.add_heading("Result");
   page.add_facts(facts(result, differences, texture));
-  if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration");
+  if (is_plotted) page.add_plot("plot.png", "loss, smoothing and vertices by iteration", curves);
   page.write(folder_ / "index.html");
 }
 

@@ -115,6 +115,13 @@ std::string to_text(const Json& json) {
   return text + "\n";
 }
 
+std::string script_safe(const Json& json) {
+  std::string safe;
+  for (const char c : json.dump(-1, ' ', false, Json::error_handler_t::replace))
+    safe += c == '<' ? "\\u003c" : std::string(1, c);
+  return safe;
+}
+
 void write_json(const std::filesystem::path& file, const Json& json) {
   write_whole_file(file, to_text(json));
 }

@@ -35,6 +35,8 @@ void add_lens(Json& json, const Camera& camera);
 
 /// Objects and lists of lists over several lines, lists of numbers on one.
 std::string to_text(const Json& json);
+/// On one line, and safe within a script element of a page: no text in it ends the element.
+std::string script_safe(const Json& json);
 /// Writes all or nothing. Throws IoError.
 void write_json(const std::filesystem::path& file, const Json& json);
 

@@ -1,93 +1,17 @@
 #include "cli/page.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <ostream>
 
 #include "base/output_file.hpp"
+#include "cli/json.hpp"
+#include "cli/page_script.hpp"
 #include "cli/text.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr::cli {
 namespace {
-
-constexpr const char* k_style = R"(<style>
-:root { color-scheme: light dark; --text: #222; --page: #fff; --quiet: #555; --line: #ddd; --frame: #bbb; }
-@media (prefers-color-scheme: dark) {
-  :root { --text: #ddd; --page: #181818; --quiet: #aaa; --line: #444; --frame: #666; }
-}
-body { font-family: system-ui, sans-serif; line-height: 1.4; max-width: 62rem; margin: 1.5rem auto; padding: 0 1rem;
-  color: var(--text); background: var(--page); }
-h1 { line-height: 1.15; margin-bottom: 0.3em; }
-h2 { margin-top: 1.8em; }
-.source { color: var(--quiet); font-size: 90%; overflow-wrap: anywhere; }
-figure { margin: 0; min-width: 0; }
-figure img { display: block; width: 100%; object-fit: cover; box-sizing: border-box; border: 1px solid var(--frame); }
-img.pixels { image-rendering: pixelated; }
-figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
-.pictures, .stage, .row { display: grid; gap: 0.8rem; align-items: start; }
-.pictures, .stage { grid-template-columns: repeat(auto-fit, minmax(min(100%, 9.5rem), 1fr)); }
-.stage { max-width: calc(20rem * var(--stage)); }
-.rows { display: grid; gap: 0.8rem; margin-top: 0.6rem;
-  grid-template-columns: repeat(auto-fill, minmax(min(100%, calc(6.5rem * var(--row))), 1fr)); }
-.row { grid-template-columns: repeat(var(--row), minmax(0, 1fr)); gap: 0.3rem; }
-.controls { display: flex; gap: 0.8rem; align-items: center; max-width: 40rem; margin: 0.6rem 0; }
-.controls input { flex: 1; min-width: 0; height: 2rem; margin: 0; }
-.controls button { font: inherit; padding: 0.4em 1em; min-width: 5.5em; }
-.wipe { max-width: 25rem; margin-top: 1.2rem; }
-.wipe .pictures { display: block; position: relative; }
-.wipe figure + figure { position: absolute; inset: 0; }
-.wipe figcaption { display: none; }
-.plot { width: 100%; }
-[hidden] { display: none; }
-table { border-collapse: collapse; margin: 1em 0; }
-td, th { padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line);
-  font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
-th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
-</style>
-)";
-
-// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied into
-// its stage, and shown again whenever the slider moves.
-constexpr const char* k_script = R"(<script>
-for (const wipe of document.querySelectorAll('.wipe')) {
-  const over = wipe.querySelector('figure + figure'), slider = wipe.querySelector('input');
-  slider.oninput = () => { over.style.clipPath = 'inset(0 ' + (100 - slider.value) + '% 0 0)'; };
-  slider.oninput();
-  wipe.hidden = false;
-}
-for (const player of document.querySelectorAll('.player')) {
-  const rows = [...player.querySelectorAll('.row')];
-  const stage = player.querySelector('.stage'), controls = player.querySelector('.controls');
-  const button = controls.querySelector('button'), slider = controls.querySelector('input');
-  const screens = [...rows[0].children].map(figure => stage.appendChild(figure.cloneNode(true)));
-  const show = () => {
-    const figures = [...rows[slider.value].children];
-    const caption = figure => figure.querySelector('figcaption').textContent;
-    slider.ariaValueText = figures.map(caption).join(', ');
-    screens.forEach((screen, i) => {
-      const [to, from] = [screen, figures[i]].map(f => f.querySelector('img'));
-      if (to.src !== from.src) to.src = from.src;
-      to.style.cssText = from.style.cssText;
-      to.alt = from.alt;
-      screen.querySelector('figcaption').textContent = caption(figures[i]);
-    });
-  };
-  let timer = 0;
-  const stop = () => { clearInterval(timer); timer = 0; button.textContent = 'Play'; };
-  const step = () => { slider.value = (Number(slider.value) + 1) % rows.length; show(); };
-  button.onclick = () => {
-    if (timer) return stop();
-    timer = setInterval(step, 400);
-    button.textContent = 'Pause';
-    step();
-  };
-  slider.oninput = () => { stop(); show(); };
-  show();
-  stage.hidden = controls.hidden = false;
-  player.querySelector('details').open = false;
-}
-</script>
-)";
 
 std::string escaped(const std::string& text) {
   std::string html;
@@ -130,7 +54,28 @@ std::string figures(const std::vector<Picture>& pictures) {
   return html;
 }
 
-/// Small enough for strips that browsers show.
+/// A number that is none becomes null.
+Json short_number(double value) { return std::isfinite(value) ? Json::parse(format("%.5g", value)) : Json(); }
+
+/// The values of a plot as the page's script reads them.
+std::string plot_data(const Plot& plot) {
+  Json curves = Json::array();
+  for (const Panel& panel : plot.panels) {
+    for (const Curve& curve : panel.curves) {
+      Json y = Json::array();
+      for (const double value : curve.y) y.push_back(short_number(value));
+      curves.push_back({{"name", curve.title}, {"y", y}});
+    }
+  }
+  return script_safe({{"name", plot.x_label},
+                      {"x", plot.x},
+                      {"left", k_plot_left},
+                      {"right", k_plot_right},
+                      {"curves", curves}});
+}
+
+}  // namespace
+
 Image fitted(const Image& image) {
   constexpr int k_longest = 480;
   const int longest = std::max(image.width, image.height);
@@ -138,8 +83,6 @@ Image fitted(const Image& image) {
   const auto scaled = [&](int side) { return std::max(1, side * k_longest / longest); };
   return resample(image, scaled(image.width), scaled(image.height));
 }
-
-}  // namespace
 
 std::vector<Picture> write_strip(const std::filesystem::path& file, const std::vector<Image>& images,
                                  const std::vector<std::string>& captions) {
@@ -166,8 +109,9 @@ Page::Page(const PageSource& source) {
   html_ =
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-      title + "</title>\n" + k_style + "</head>\n<body>\n<h1>" + title + "</h1>\n<p class=\"source\"><code>" +
-      escaped(source.command) + "</code><br>" + escaped(source.device) + "</p>\n";
+      title + "</title>\n" + std::string(page_style()) + "</head>\n<body>\n<h1>" + title +
+      "</h1>\n<p class=\"source\"><code>" + escaped(source.command) + "</code><br>" + escaped(source.device) +
+      "</p>\n";
 }
 
 void Page::add_heading(const std::string& text) { html_ += "<h2>" + escaped(text) + "</h2>\n"; }
@@ -232,8 +176,55 @@ void Page::add_plot(const std::string& file, const std::string& caption, int wid
            "\" style=\"max-width: min(100%, " + std::to_string(width) + "px)\"></p>\n";
 }
 
+void Page::add_plot(const std::string& file, const std::string& caption, const Plot& plot) {
+  constexpr int k_width = 640;
+  const auto [low, high] = std::ranges::minmax_element(plot.x);
+  if (plot.x.empty() || *low == *high) return add_plot(file, caption, k_width);
+  html_ +=
+      "<div class=\"curves\" style=\"max-width: " + std::to_string(k_width) +
+      "px\" role=\"group\" aria-label=\"" + escaped(caption) + "\">\n<img src=\"" + escaped(file) +
+      "\" alt=\"" + escaped(caption) +
+      "\"><div class=\"place\" hidden></div>\n<script type=\"application/json\">" + plot_data(plot) +
+      "</script></div>\n<p class=\"values\" aria-live=\"polite\" hidden>Point at the curves to read their "
+      "values, or focus them and use the arrow keys.</p>\n";
+}
+
+void Page::add_model(const Model& model) {
+  if (three_js().empty()) return;
+  if (model.faces.size() > k_most_model_faces) {
+    add_heading(model.heading);
+    add_paragraph(format("A model to turn by hand is left out: it has %zu triangles, and a page at most %zu.",
+                         model.faces.size(), k_most_model_faces));
+    return;
+  }
+  has_models_ = true;
+  constexpr double k_widest = 2, k_tallest = 0.75;
+  const double aspect =
+      std::clamp(static_cast<double>(model.start.width) / model.start.height, k_tallest, k_widest);
+  html_ += "<section class=\"model\" hidden>\n";
+  add_heading(model.heading);
+  html_ +=
+      "<p class=\"without\" hidden>This browser has no WebGL, which a model to turn by hand needs.</p>\n"
+      "<figure><div class=\"view\" style=\"" +
+      format("aspect-ratio: %.4g", aspect) + "\"><canvas tabindex=\"0\" role=\"img\" aria-label=\"" +
+      escaped(model.heading) + ": arrow keys turn it, plus and minus zoom\"></canvas></div>\n<figcaption>" +
+      escaped(model.caption) +
+      " Drag to turn; the wheel or two fingers zoom, and so do the keys + and -, the arrow keys turn."
+      "</figcaption>\n<button type=\"button\">First view</button></figure>\n"
+      "<script type=\"application/json\">" +
+      model_data(model) + "</script>\n</section>\n";
+}
+
 void Page::write(const std::filesystem::path& file) const {
-  write_whole_file(file, [&](std::ostream& out) { out << html_ << k_script << "</body>\n</html>\n"; });
+  write_whole_file(file, [&](std::ostream& out) {
+    out << html_ << page_script();
+    if (has_models_) {
+      out << "<script>\n// three.js, Copyright 2010-2019 three.js authors, under the MIT License\n"
+          << three_js() << "\n</script>\n"
+          << model_script();
+    }
+    out << "</body>\n</html>\n";
+  });
 }
 
 }  // namespace dpr::cli

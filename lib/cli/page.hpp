@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "cli/page_model.hpp"
+#include "cli/plot.hpp"
 #include "dpr/image.hpp"
 
 namespace dpr::cli {
@@ -22,6 +24,8 @@ struct Picture {
   double position = 0;        ///< of the frame in its strip: 0 at the left end, 1 at the right end
 };
 
+/// At most 480 pixels long: small enough for strips that browsers show.
+Image fitted(const Image& image);
 /// Writes images of one size side by side into a file, each at most 480 pixels long; no file for no images.
 /// The frames, with their captions, as many as images. Throws IoError.
 std::vector<Picture> write_strip(const std::filesystem::path& file, const std::vector<Image>& images,
@@ -52,6 +56,11 @@ class Page {
   void add_player(const std::vector<Picture>& fixed, const std::vector<std::vector<Picture>>& rows);
   /// At most `width` CSS pixels wide; 640 suit what plot() draws.
   void add_plot(const std::string& file, const std::string& caption, int width = 640);
+  /// What plot() drew of these values, which are read where one points at the curves.
+  void add_plot(const std::string& file, const std::string& caption, const Plot& plot);
+  /// With its heading; nothing without script. Too large a model is left out, and the page says so. Does nothing where
+  /// the command was built without three.js.
+  void add_model(const Model& model);
 
   /// Throws IoError.
   void write(const std::filesystem::path& file) const;
@@ -60,6 +69,7 @@ class Page {
   void add_row(const TableRow& row, const char* first, const char* others);
 
   std::string html_;
+  bool has_models_ = false;
 };
 
 }  // namespace dpr::cli

@@ -131,19 +131,19 @@ bool draw(const std::filesystem::path& file, int width, int height, const std::s
   return true;
 }
 
-bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
-          const std::vector<Panel>& panels) {
+bool plot(const std::filesystem::path& file, const Plot& plot) {
   constexpr int k_width = 960, k_panel_height = 500;  // twice as many pixels as a page shows
   constexpr double k_scale = 2;
   std::ostringstream script;
   script.precision(std::numeric_limits<double>::max_digits10);
-  script << "set multiplot layout " << panels.size() << ",1\n"
-         << "set grid\nset lmargin 11\nset rmargin 3\nset format y '%g'\nset xlabel "
-         << gnuplot_quote(x_label) << "\n";
+  script << "set multiplot layout " << plot.panels.size() << ",1\n"
+         << "set grid\nset autoscale xfix\nset lmargin at screen " << k_plot_left
+         << "\nset rmargin at screen " << k_plot_right << "\nset format y '%g'\nset xlabel "
+         << gnuplot_quote(plot.x_label) << "\n";
   std::size_t index = 0;
-  for (const Panel& panel : panels) write_panel(script, panel, x, index);
+  for (const Panel& panel : plot.panels) write_panel(script, panel, plot.x, index);
   script << "unset multiplot\n";
-  return draw(file, k_width, k_panel_height * static_cast<int>(panels.size()), script.str(), k_scale);
+  return draw(file, k_width, k_panel_height * static_cast<int>(plot.panels.size()), script.str(), k_scale);
 }
 
 }  // namespace dpr::cli

@@ -20,6 +20,16 @@ struct Panel {
   std::vector<Curve> curves;
 };
 
+/// Panels below each other, over a common x.
+struct Plot {
+  std::string x_label;
+  std::vector<double> x;
+  std::vector<Panel> panels;
+};
+
+/// Where the smallest and the largest x are in what plot() draws: 0 at its left edge, 1 at its right edge.
+inline constexpr double k_plot_left = 0.23, k_plot_right = 0.965;
+
 /// A string of gnuplot's: in single quotes, which are doubled inside.
 std::string gnuplot_quote(const std::string& text);
 
@@ -29,8 +39,7 @@ std::string gnuplot_quote(const std::string& text);
 bool draw(const std::filesystem::path& file, int width, int height, const std::string& commands,
           double scale = 1);
 
-/// Draws the panels below each other over a common x into a PNG file; else as draw().
-bool plot(const std::filesystem::path& file, const std::string& x_label, const std::vector<double>& x,
-          const std::vector<Panel>& panels);
+/// Draws into a PNG file; else as draw().
+bool plot(const std::filesystem::path& file, const Plot& plot);
 
 }  // namespace dpr::cli

@@ -57,7 +57,7 @@ void add_numbers(Page& page, const PoseResult& result, const std::optional<glm::
   page.add_facts(rows);
 }
 
-void add_equals(Page& page, const PoseResult& result) {
+void add_equals(Page& page, const PoseResult& result, const std::vector<Picture>& pictures) {
   if (result.equals.size() < 2) return;
   std::vector<TableRow> rows{{"rotation vector, radians", "translation", "degrees from the result", "loss"}};
   for (const PoseHypothesis& other : result.equals) {
@@ -67,6 +67,9 @@ void add_equals(Page& page, const PoseResult& result) {
                     format("%.4g", other.loss)});
   }
   page.add_heading("Poses that explain the target equally well");
+  if (pictures.size() < result.equals.size())
+    page.add_paragraph(format("%zu of the %zu poses.", pictures.size(), result.equals.size()));
+  page.add_pictures(pictures);
   page.add_table(rows);
 }
 
@@ -81,10 +84,10 @@ void add_body(Page& page, const PoseResult& result, const Picture& target, const
   page.add_player({target}, rows);
   page.add_heading("Result" + suffix);
   add_numbers(page, result, truth);
-  add_equals(page, result);
+  add_equals(page, result, pictures.equals);
   if (pictures.plot.empty()) return;
   page.add_heading("Iterations" + suffix);
-  page.add_plot(pictures.plot, "loss, rotation and smoothing by iteration");
+  page.add_plot(pictures.plot, "loss, rotation and smoothing by iteration", pictures.curves);
 }
 
 }  // namespace
@@ -95,6 +98,7 @@ void write_pose_page(const std::filesystem::path& file, const PageSource& source
   Page page(source);
   page.add_pictures({pictures.target, pictures.start, pictures.end, pictures.difference});
   page.add_wipe(pictures.target, pictures.end);
+  page.add_model(pictures.model);
   for (std::size_t i = 0; i < found.size(); ++i) {
     const std::string suffix = suffix_of(found[i], found.size());
     add_body(page, found[i].result, pictures.target, pictures.bodies[i], suffix, truth);

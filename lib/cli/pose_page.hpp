@@ -16,12 +16,16 @@ namespace dpr::cli {
 struct BodyPictures {
   std::vector<Picture> frames;  ///< the start and iterations
   std::string plot;             ///< file; empty: none
+  Plot curves;                  ///< what it shows
+  std::vector<Picture>
+      equals;  ///< some of the poses that explain the target equally well; empty: there is one
 };
 
 /// The pictures that write_pose_report() left.
 struct PosePictures {
   Picture target, start, end, difference;
   std::vector<BodyPictures> bodies;
+  Model model;  ///< the scene as it was found, and its camera
 };
 
 /// One HTML file that refers to the pictures beside it. Throws IoError.

@@ -22,6 +22,7 @@ namespace dpr::cli {
 namespace {
 
 constexpr std::size_t k_strip_length = 12;  // the start among them
+constexpr std::size_t k_most_equals = 12;
 
 /// Renders the scene with its body in any pose, in a light that was found.
 class PoseCamera {
@@ -106,8 +107,23 @@ std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera&
   return write_strip(file, images, captions);
 }
 
-bool plot_history(const std::filesystem::path& file, const std::vector<PoseIteration>& history,
-                  const glm::dmat3& start, const std::optional<glm::dmat3>& truth) {
+/// Poses that explain the target equally well, as the end is rendered.
+std::vector<Picture> write_equals(const std::filesystem::path& file, PoseCamera& camera,
+                                  const PoseResult& result) {
+  if (result.equals.size() < 2) return {};
+  std::vector<Image> images;
+  std::vector<std::string> captions;
+  for (const PoseHypothesis& other : result.equals) {
+    if (images.size() == k_most_equals) break;
+    images.push_back(camera.render(other, rigid_smoothing()));
+    captions.push_back(format("%.2f degrees from the result, loss %.4g",
+                              angle_degrees(other.pose.rotation, result.pose.rotation), other.loss));
+  }
+  return write_strip(file, images, captions);
+}
+
+Plot pose_plot(const std::vector<PoseIteration>& history, const glm::dmat3& start,
+               const std::optional<glm::dmat3>& truth) {
   constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
   std::vector<double> x;
   Curve loss{"loss", {}}, angle{"angle", {}}, sigma{"sigma", {}}, gamma{"gamma", {}};
@@ -120,10 +136,11 @@ bool plot_history(const std::filesystem::path& file, const std::vector<PoseItera
                             : angle_degrees(step.pose.rotation, start));
   }
   const char* const angle_title = truth ? "Rotation from the truth" : "Rotation from the start";
-  return plot(file, "iteration", x,
-              {{"Loss at the level's resolution", "loss", true, {loss}},
-               {angle_title, "degrees", false, {angle}},
-               {"Smoothing", "scale", true, {sigma, gamma}}});
+  return {"iteration",
+          x,
+          {{"Loss at the level's resolution", "loss", true, {loss}},
+           {angle_title, "degrees", false, {angle}},
+           {"Smoothing", "scale", true, {sigma, gamma}}}};
 }
 
 Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3>& truth) {
@@ -251,6 +268,35 @@ Json pose_to_json(const Scene& scene, const FoundBody& found, const std::optiona
 
 namespace {
 
+/// A scene as it was found, from where its camera sees it; turned about a body of it.
+Model found_model(const Scene& scene, const FoundBody& body, const Image& target) {
+  Model model;
+  model.heading = "The result, to turn by hand";
+  model.caption = "The result as the camera sees it, before the target.";
+  const PoseBody turned(scene, body.meshes);
+  std::vector<std::size_t> meshes;
+  for (const BodyPart& part : turned.parts()) meshes.push_back(part.mesh);
+  const auto add = [&](std::size_t i) { add_mesh(model, mesh_of(scene, i), scene.meshes[i].transform); };
+  for (const std::size_t i : meshes) add(i);
+  model.pivot = center(bounding_box(model.positions));
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i)
+    if (std::ranges::find(meshes, i) == meshes.end()) add(i);
+
+  const Camera camera = calibrated(scene.camera, body.result.focal_scale, body.result.radial);
+  float depth = camera.znear;
+  for (const glm::vec3& p : model.positions) depth = std::max(depth, -(camera.view * glm::vec4(p, 1)).z);
+  model.start = {camera, scene.width, scene.height};
+  model.up = glm::normalize(glm::vec3(glm::inverse(camera.view)[1]));
+  model.cameras = {{.camera = camera,
+                    .width = scene.width,
+                    .height = scene.height,
+                    .depth = depth,
+                    .label = "camera",
+                    .name = "camera",
+                    .picture = target}};
+  return model;
+}
+
 /// The kind of light that all bodies are seen in: one that is found with any body holds for all.
 PoseLight light_of_all(std::span<const FoundBody> found) {
   const auto strongest =
@@ -317,8 +363,10 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
     iterations += result.iterations;
     BodyPictures& body = pictures.bodies.emplace_back();
     body.frames = write_frames(folder / ("iterations" + number + ".png"), camera, result, truth);
+    body.equals = write_equals(folder / ("equals" + number + ".png"), camera, result);
     body.plot = "plot" + number + ".png";
-    if (!plot_history(folder / body.plot, result.history, result.start.rotation, truth)) {
+    body.curves = pose_plot(result.history, result.start.rotation, truth);
+    if (!plot(folder / body.plot, body.curves)) {
       if (!quiet) std::printf("%s is left out: gnuplot is not installed\n", body.plot.c_str());
       body.plot.clear();
     }
@@ -332,6 +380,7 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
   const Differences difference = differences({end}, {target});
   pictures.difference = write_picture(folder / "difference.png", difference.images.front(),
                                       difference.caption() + ": end and target");
+  pictures.model = found_model(with_others(scene, found), found.front(), target);
   write_pose_page(folder / "index.html", source, found, pictures, truth);
 }
 

@@ -99,7 +99,7 @@ std::string frames_text(const std::vector<TrackRow>& rows, TrackStatus status) {
 }
 
 /// Rotation from the first pose found, and the translation, where the object is not lost; and the losses.
-bool plot_track(const std::filesystem::path& file, const std::vector<TrackRow>& rows) {
+Plot track_plot(const std::vector<TrackRow>& rows) {
   constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
   constexpr double k_none = std::numeric_limits<double>::quiet_NaN();
   const auto first = std::ranges::find_if_not(rows, is_lost);
@@ -120,7 +120,7 @@ bool plot_track(const std::filesystem::path& file, const std::vector<TrackRow>& 
     panels.push_back({"Rotation from the first", "degrees", false, {angle}});
     panels.push_back({"Translation", "world", false, {places.begin(), places.end()}});
   }
-  return plot(file, "frame", x, panels);
+  return {"frame", x, panels};
 }
 
 std::vector<TableRow> table(const std::vector<TrackRow>& rows) {
@@ -178,7 +178,8 @@ void TrackReport::write(const PageSource& source, const Device& device, const Sc
   const std::vector<Kept> kept = all_kept();
   std::vector<std::vector<Picture>> pictures;
   for (const Picture& picture : write_frames(device, scene, kept)) pictures.push_back({picture});
-  const bool is_plotted = plot_track(folder_ / "plot.png", rows);
+  const Plot curves = track_plot(rows);
+  const bool is_plotted = plot(folder_ / "plot.png", curves);
   if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
 
   Page page(source);
@@ -193,7 +194,7 @@ void TrackReport::write(const PageSource& source, const Device& device, const Sc
                   {"searched for and found", frames_text(rows, TrackStatus::found)},
                   {"followed", frames_text(rows, TrackStatus::tracked)},
                   {"lost", frames_text(rows, TrackStatus::lost)}});
-  if (is_plotted) page.add_plot("plot.png", "loss, rotation and translation by frame");
+  if (is_plotted) page.add_plot("plot.png", "loss, rotation and translation by frame", curves);
   page.add_heading("Poses");
   page.add_table(table(rows));
   page.write(folder_ / "index.html");

@@ -147,8 +147,8 @@ void plot_losses(const std::filesystem::path& file, const std::vector<double>& l
     means.push_back(sum / static_cast<double>(window));
   }
   if (steps.size() > 1)
-    plot(file, "step", steps,
-         {{"Training loss, means of consecutive steps", "loss", true, {{"mean", means}}}});
+    plot(file,
+         {"step", steps, {{"Training loss, means of consecutive steps", "loss", true, {{"mean", means}}}}});
 }
 
 std::string validation_text(const learn::TrainingProgress& progress) {
@@ -195,8 +195,10 @@ void train(const TrainCommand& command, const CommonOptions& common) {
   const std::filesystem::path folder(command.output);
   plot_losses(folder / "losses.png", result.losses);
   if (result.validation_steps.size() > 1) {
-    plot(folder / "validation.png", "step", result.validation_steps,
-         {{"Validation on unseen shapes", "mean IoU", false, {{"validation", result.validation_iou}}}});
+    plot(folder / "validation.png",
+         {"step",
+          result.validation_steps,
+          {{"Validation on unseen shapes", "mean IoU", false, {{"validation", result.validation_iou}}}}});
   }
   if (!common.quiet) print_result(command.output, result);
 }

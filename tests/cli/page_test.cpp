@@ -3,9 +3,13 @@
 
 #include <doctest/doctest.h>
 
+#include <limits>
+#include <nlohmann/json.hpp>
+
 #include "cli/difference.hpp"
 #include "cli/progress.hpp"
 #include "support/messages.hpp"
+#include "support/page.hpp"
 #include "support/temp_dir.hpp"
 
 namespace page_test {
@@ -75,6 +79,40 @@ TEST_SUITE("unit") {
     CHECK(contains(html, "src=\"b.png\""));
     CHECK(contains(html, "<p>Left: &lt;end&gt;. Right: target.</p>"));
     CHECK(contains(html, "<section class=\"wipe\" hidden>"));
+  }
+
+  TEST_CASE("page: the values of a plot lie beside it, and its texts are text") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    constexpr double k_none = std::numeric_limits<double>::quiet_NaN();
+    page.add_plot("plot.png", "<curves>",
+                  {"</script><b>",
+                   {3, 5, 9},
+                   {{"Loss", "loss", true, {{"loss", {0.1234567, 2e-9, k_none}}}},
+                    {"Two", "y", false, {{"a", {1, 2, 3}}, {"b", {4, 5, 6}}}}}});
+    const std::string html = written(folder, page);
+    CHECK(contains(html, "src=\"plot.png\" alt=\"&lt;curves&gt;\""));
+    CHECK_FALSE(contains(html, "<b>"));
+    const std::string begin = "<script type=\"application/json\">";
+    const std::size_t first = html.find(begin) + begin.size();
+    const auto data = nlohmann::json::parse(html.substr(first, html.find("</script>", first) - first));
+    CHECK(data["name"] == "</script><b>");
+    CHECK(data["x"] == nlohmann::json{3, 5, 9});
+    REQUIRE(data["curves"].size() == 3);
+    CHECK(data["curves"][0]["y"] == nlohmann::json{0.12346, 2e-9, nullptr});
+    CHECK(data["curves"][2]["name"] == "b");
+    CHECK(data["curves"][2]["y"][2] == 6);
+  }
+
+  TEST_CASE("page: a plot of a single place is a picture alone") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    page.add_plot("one.png", "one", {"x", {1}, {{"Loss", "loss", true, {{"loss", {1}}}}}});
+    page.add_plot("none.png", "none", {"x", {}, {}});
+    const std::string html = written(folder, page);
+    CHECK(contains(html, "src=\"one.png\""));
+    CHECK(contains(html, "src=\"none.png\""));
+    CHECK(dpr::test::count_of(html, "<script") == 1);
   }
 
   TEST_CASE("differences: the gain shows small ones, leaves large ones, and is said") {

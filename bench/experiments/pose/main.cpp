@@ -51,8 +51,8 @@ std::size_t count_of(const Options& options) { return options.smoke ? k_smoke_co
 
 /// The solved part against the threshold: a curve a run.
 void draw(const std::filesystem::path& file, const std::vector<cli::Curve>& curves) {
-  cli::plot(file, "threshold, degrees", shown_thresholds(),
-            {cli::Panel{"Solved problems", "share solved", false, curves}});
+  cli::plot(file,
+            {"threshold, degrees", shown_thresholds(), {{"Solved problems", "share solved", false, curves}}});
 }
 
 /// Every combination asked for, or the problems of a file.
