@@ -107,7 +107,6 @@ Model shape_model(const ShapeResult& result, const ShapeViews& views, const std:
   }
   model.caption = "The shape and the cameras of the images, by number.";
   if (!are_all_explained) model.caption += " Those whose image is not explained are red.";
-  if (!result.mesh.textures.empty()) model.caption += " The texture is shown as one colour a vertex.";
   model.up = common_up(model.cameras);
   model.start = overview(model);
   return model;

@@ -76,11 +76,10 @@ std::string plot_data(const Plot& plot) {
 
 }  // namespace
 
-Image fitted(const Image& image) {
-  constexpr int k_longest = 480;
-  const int longest = std::max(image.width, image.height);
-  if (longest <= k_longest) return image;
-  const auto scaled = [&](int side) { return std::max(1, side * k_longest / longest); };
+Image fitted(const Image& image, int longest) {
+  const int side = std::max(image.width, image.height);
+  if (side <= longest) return image;
+  const auto scaled = [&](int length) { return std::max(1, length * longest / side); };
   return resample(image, scaled(image.width), scaled(image.height));
 }
 
@@ -182,11 +181,12 @@ void Page::add_plot(const std::string& file, const std::string& caption, const P
   if (plot.x.empty() || *low == *high) return add_plot(file, caption, k_width);
   html_ +=
       "<div class=\"curves\" style=\"max-width: " + std::to_string(k_width) +
-      "px\" role=\"group\" aria-label=\"" + escaped(caption) + "\">\n<img src=\"" + escaped(file) +
-      "\" alt=\"" + escaped(caption) +
-      "\"><div class=\"place\" hidden></div>\n<script type=\"application/json\">" + plot_data(plot) +
-      "</script></div>\n<p class=\"values\" aria-live=\"polite\" hidden>Point at the curves to read their "
-      "values, or focus them and use the arrow keys.</p>\n";
+      "px\">\n<div class=\"picture\" role=\"group\" aria-label=\"" + escaped(caption) + "\"><img src=\"" +
+      escaped(file) + "\" alt=\"" + escaped(caption) +
+      "\"><div class=\"place\" hidden></div></div>\n"
+      "<p class=\"values\" aria-live=\"polite\" hidden>Point at the curves to read their values, or focus "
+      "them and use the arrow keys.</p>\n<script type=\"application/json\">" +
+      plot_data(plot) + "</script></div>\n";
 }
 
 void Page::add_model(const Model& model) {

@@ -24,8 +24,8 @@ struct Picture {
   double position = 0;        ///< of the frame in its strip: 0 at the left end, 1 at the right end
 };
 
-/// At most 480 pixels long: small enough for strips that browsers show.
-Image fitted(const Image& image);
+/// At most that many pixels long; 480 are small enough for strips that browsers show.
+Image fitted(const Image& image, int longest = 480);
 /// Writes images of one size side by side into a file, each at most 480 pixels long; no file for no images.
 /// The frames, with their captions, as many as images. Throws IoError.
 std::vector<Picture> write_strip(const std::filesystem::path& file, const std::vector<Image>& images,

@@ -6,7 +6,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 
 #include "cli/json.hpp"
@@ -58,45 +60,54 @@ std::string faces_text(const std::vector<glm::uvec3>& faces) {
   return base64(bytes);
 }
 
-/// The nearest texel.
-glm::vec3 texel_at(const Texture& texture, glm::vec2 uv) {
-  const auto place = [&](float coordinate, int size) {
-    switch (texture.wrap) {
-      case Wrap::repeat:
-        coordinate -= std::floor(coordinate);
-        break;
-      case Wrap::mirror:
-        coordinate = 1 - std::abs(coordinate - 2 * std::floor(coordinate / 2) - 1);
-        break;
-      case Wrap::clamp:
-        break;
-    }
-    const float texels = std::clamp(coordinate, 0.0F, 1.0F) * static_cast<float>(size);
-    return static_cast<std::size_t>(std::min(static_cast<int>(texels), size - 1));
-  };
-  const std::size_t column = place(uv.x, texture.width), row = place(1 - uv.y, texture.height);
-  return texture.texels[row * static_cast<std::size_t>(texture.width) + column];
+std::string normals_text(const std::vector<glm::vec3>& normals) {
+  std::string bytes;
+  for (const glm::vec3& normal : normals)
+    for (int k = 0; k < 3; ++k) bytes += static_cast<char>(std::lround(127 * normal[k]));
+  return base64(bytes);
 }
 
-/// What the texture of a face has at a corner; white where it has none.
-glm::vec3 texture_color(const Mesh& mesh, std::size_t face, int corner) {
-  if (mesh.textures.empty()) return glm::vec3(1);
-  const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
-  if (texture == k_no_texture) return glm::vec3(1);
-  return texel_at(mesh.textures[texture], mesh.texcoords[mesh.face_texcoords[face][corner]]);
+std::string texcoords_text(const std::vector<glm::vec2>& texcoords) {
+  std::string bytes;
+  for (const glm::vec2& t : texcoords)
+    for (int k = 0; k < 2; ++k) append_little_endian(bytes, std::bit_cast<std::uint32_t>(t[k]));
+  return base64(bytes);
 }
 
-/// [vertex] the colours of a mesh whose faces have none of their own.
-std::vector<glm::vec3> vertex_colors_of(const Mesh& mesh) {
-  std::vector<glm::vec3> colors = mesh.vertex_colors;
-  colors.resize(mesh.positions.size(), glm::vec3(1));
-  if (mesh.textures.empty()) return colors;
-  std::vector<glm::vec4> sums(colors.size(), glm::vec4(0));
-  for (std::size_t face = 0; face < mesh.faces.size(); ++face)
-    for (int k = 0; k < 3; ++k) sums[mesh.faces[face][k]] += glm::vec4(texture_color(mesh, face, k), 1);
-  for (std::size_t i = 0; i < colors.size(); ++i)
-    if (sums[i].w > 0) colors[i] *= glm::vec3(sums[i]) / sums[i].w;
-  return colors;
+std::string picture_address(const Texture& texture) {
+  return "data:image/png;base64," + base64(encode_texture("picture.png", texture));
+}
+
+Texture texture_of(const Image& image) {
+  Texture texture{image.width, image.height, {}};
+  for (const glm::vec4& pixel : image.pixels) texture.texels.emplace_back(pixel);
+  return texture;
+}
+
+/// Not too large for a page.
+Json texture_data(const Texture& texture) {
+  constexpr int k_longest = 1024;
+  constexpr std::array<const char*, 3> k_wraps{"Repeat", "MirroredRepeat", "ClampToEdge"};
+  Image image(texture.width, texture.height);
+  for (std::size_t i = 0; i < texture.texels.size(); ++i) image.pixels[i] = glm::vec4(texture.texels[i], 1);
+  return {{"picture", picture_address(texture_of(fitted(image, k_longest)))},
+          {"wrap", k_wraps[static_cast<std::size_t>(texture.wrap)]}};
+}
+
+/// [vertex] of unit length, or 0 where no face says one.
+std::vector<glm::vec3> normals_of(const std::vector<glm::vec3>& positions,
+                                  const std::vector<glm::uvec3>& faces) {
+  std::vector<glm::vec3> normals(positions.size(), glm::vec3(0));
+  for (const glm::uvec3& face : faces) {
+    const glm::vec3 origin = positions[face.x];
+    const glm::vec3 normal = glm::cross(positions[face.y] - origin, positions[face.z] - origin);
+    for (int k = 0; k < 3; ++k) normals[face[k]] += normal;
+  }
+  for (glm::vec3& normal : normals) {
+    const float length = glm::length(normal);
+    normal = length > 0 && std::isfinite(length) ? normal / length : glm::vec3(0);
+  }
+  return normals;
 }
 
 /// Corners of a picture that lies in a plane at some depth, from the lower left one to the right, world.
@@ -133,10 +144,7 @@ Json camera_data(const ModelCamera& camera) {
   json["near"] = corners_to_json(plane_corners(camera.camera, camera.width, camera.height, 0));
   json["far"] = corners_to_json(plane_corners(camera.camera, camera.width, camera.height, camera.depth));
   if (camera.picture.pixels.empty()) return json;
-  const Image picture = fitted(camera.picture);
-  Texture texture{picture.width, picture.height, {}};
-  for (const glm::vec4& pixel : picture.pixels) texture.texels.emplace_back(pixel);
-  json["picture"] = "data:image/png;base64," + base64(encode_texture("picture.png", texture));
+  json["picture"] = picture_address(texture_of(fitted(camera.picture)));
   return json;
 }
 
@@ -161,23 +169,35 @@ Json start_to_json(const Viewpoint& start) {
 }  // namespace
 
 void add_mesh(Model& model, const Mesh& mesh, const glm::mat4& transform) {
-  const auto first = static_cast<std::uint32_t>(model.positions.size());
-  const auto add_vertex = [&](glm::vec3 position, glm::vec3 color) {
-    model.positions.emplace_back(transform * glm::vec4(position, 1));
-    model.colors.push_back(color);
-  };
-  if (mesh.face_colors.empty()) {
-    const std::vector<glm::vec3> colors = vertex_colors_of(mesh);
-    for (std::size_t i = 0; i < colors.size(); ++i) add_vertex(mesh.positions[i], colors[i]);
-    for (const glm::uvec3& face : mesh.faces) model.faces.push_back(first + face);
-    return;
-  }
+  std::vector<glm::vec3> positions;
+  for (const glm::vec3& p : mesh.positions) positions.emplace_back(transform * glm::vec4(p, 1));
+  const std::vector<glm::vec3> normals = normals_of(positions, mesh.faces);
+  const auto first_texture = static_cast<std::uint32_t>(model.textures.size());
+  const bool is_textured = !mesh.textures.empty();
+  // A vertex of the mesh is one of the model for each of its texture coordinates, and for each coloured face.
+  std::unordered_map<std::uint64_t, std::uint32_t> known;
   for (std::size_t face = 0; face < mesh.faces.size(); ++face) {
-    const auto corner = static_cast<std::uint32_t>(model.positions.size());
-    for (int k = 0; k < 3; ++k)
-      add_vertex(mesh.positions[mesh.faces[face][k]], mesh.face_colors[face] * texture_color(mesh, face, k));
-    model.faces.emplace_back(corner, corner + 1, corner + 2);
+    if (!mesh.face_colors.empty()) known.clear();
+    glm::uvec3 corners;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = mesh.faces[face][k];
+      const std::uint32_t texcoord = is_textured ? mesh.face_texcoords[face][k] : 0;
+      const auto next = static_cast<std::uint32_t>(model.positions.size());
+      const auto [found, is_new] = known.try_emplace(std::uint64_t{vertex} << 32U | texcoord, next);
+      corners[k] = found->second;
+      if (!is_new) continue;
+      model.positions.push_back(positions[vertex]);
+      model.normals.push_back(normals[vertex]);
+      model.texcoords.push_back(is_textured ? mesh.texcoords[texcoord] : glm::vec2(0));
+      const glm::vec3 own = mesh.vertex_colors.empty() ? glm::vec3(1) : mesh.vertex_colors[vertex];
+      model.colors.push_back(mesh.face_colors.empty() ? own : mesh.face_colors[face]);
+    }
+    model.faces.push_back(corners);
+    const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+    model.face_textures.push_back(is_textured && texture != k_no_texture ? first_texture + texture
+                                                                         : k_no_texture);
   }
+  model.textures.insert(model.textures.end(), mesh.textures.begin(), mesh.textures.end());
 }
 
 Viewpoint overview(const Model& model) {
@@ -221,12 +241,22 @@ glm::vec3 common_up(const std::vector<ModelCamera>& cameras) {
 }
 
 std::string model_data(const Model& model) {
-  Json json{{"positions", positions_text(model.positions)},
-            {"colors", colors_text(model.colors)},
-            {"faces", faces_text(model.faces)},
-            {"pivot", to_json(glm::dvec3(model.pivot))},
-            {"up", to_json(glm::dvec3(model.up))},
+  std::vector<std::size_t> order(model.faces.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return model.face_textures[i]; });
+  std::vector<glm::uvec3> faces;
+  for (const std::size_t i : order) faces.push_back(model.faces[i]);
+  Json json{{"positions", positions_text(model.positions)}, {"normals", normals_text(model.normals)},
+            {"colors", colors_text(model.colors)},          {"faces", faces_text(faces)},
+            {"pivot", to_json(glm::dvec3(model.pivot))},    {"up", to_json(glm::dvec3(model.up))},
             {"start", start_to_json(model.start)}};
+  // How many faces have each of the textures; what is left has none.
+  Json& textures = json["textures"] = Json::array();
+  for (std::size_t i = 0; i < model.textures.size(); ++i) {
+    textures.push_back(texture_data(model.textures[i]));
+    textures.back()["faces"] = std::ranges::count(model.face_textures, static_cast<std::uint32_t>(i));
+  }
+  if (!model.textures.empty()) json["texcoords"] = texcoords_text(model.texcoords);
   Json& cameras = json["cameras"] = Json::array();
   for (const ModelCamera& camera : model.cameras) cameras.push_back(camera_data(camera));
   return script_safe(json);

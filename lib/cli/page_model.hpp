@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
 #include <string>
@@ -36,15 +37,18 @@ struct Viewpoint {
 
 struct Model {
   std::string heading, caption;
-  std::vector<glm::vec3> positions, colors;  ///< [vertex] world; linear RGB
+  std::vector<glm::vec3> positions, normals, colors;  ///< [vertex] world; linear RGB
+  std::vector<glm::vec2> texcoords;                   ///< [vertex] as Texture has them
   std::vector<glm::uvec3> faces;
+  std::vector<std::uint32_t> face_textures;  ///< [face] index into textures, or k_no_texture
+  std::vector<Texture> textures;             ///< which are multiplied by the colours
   std::vector<ModelCamera> cameras{};
   Viewpoint start{};
   glm::vec3 pivot{0.0F};     ///< it is turned about this point
   glm::vec3 up{0.0F, 1, 0};  ///< sideways turns are about this direction, a unit vector
 };
 
-/// Adds a mesh. A texture becomes colours of vertices: the mean where corners differ.
+/// Adds a mesh, its normals from the faces around its vertices.
 void add_mesh(Model& model, const Mesh& mesh, const glm::mat4& transform = glm::mat4(1.0F));
 
 /// Where all of the model's points and cameras are in sight, above the first camera and beside it; cameras far away are

@@ -35,10 +35,11 @@ figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
 .wipe figcaption { display: none; }
 .plot { width: 100%; }
 [hidden] { display: none; }
-.curves { position: relative; }
+.curves .picture { position: relative; }
 .curves img { display: block; width: 100%; }
 .curves .place { position: absolute; top: 0; bottom: 0; border-left: 2px solid #d22; pointer-events: none; }
-.values { font-variant-numeric: tabular-nums; font-size: 90%; min-height: 2.8em; margin: 0; }
+.curves .values { position: sticky; bottom: 0; margin: 0; padding: 0.3em 0; min-height: 2.8em; font-size: 90%;
+  font-variant-numeric: tabular-nums; background: var(--page); }
 .model { max-width: 40rem; }
 .model .view { position: relative; overflow: hidden; max-height: 80vh; border: 1px solid var(--frame); }
 .model canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: grab; }
@@ -100,7 +101,7 @@ for (const player of document.querySelectorAll('.player')) {
 }
 for (const curves of document.querySelectorAll('.curves')) {
   const data = JSON.parse(curves.querySelector('script').textContent), picture = curves.querySelector('img');
-  const place = curves.querySelector('.place'), values = curves.nextElementSibling;
+  const place = curves.querySelector('.place'), values = curves.querySelector('.values');
   const low = Math.min(...data.x), high = Math.max(...data.x);
   let index = 0;
   const show = chosen => {
@@ -119,15 +120,16 @@ for (const curves of document.querySelectorAll('.curves')) {
     data.x.forEach((_, i) => { if (distance(i) < distance(nearest)) nearest = i; });
     show(nearest);
   };
-  curves.onpointermove = curves.onpointerdown = point;
-  curves.onfocus = () => show(index);
-  curves.onkeydown = event => {
+  const pointed = curves.querySelector('.picture');
+  pointed.onpointermove = pointed.onpointerdown = point;
+  pointed.onfocus = () => show(index);
+  pointed.onkeydown = event => {
     const steps = {ArrowLeft: -1, ArrowRight: 1, Home: -data.x.length, End: data.x.length};
     if (!(event.key in steps)) return;
     event.preventDefault();
     show(index + steps[event.key]);
   };
-  curves.tabIndex = 0;
+  pointed.tabIndex = 0;
   values.hidden = false;
 }
 </script>
@@ -161,9 +163,28 @@ for (const model of document.querySelectorAll('.model')) {
   mesh.setAttribute('position', new THREE.BufferAttribute(positions, 3));
   mesh.setAttribute('color', new THREE.BufferAttribute(bytes(data.colors), 3, true));
   mesh.setIndex(new THREE.BufferAttribute(new Uint32Array(bytes(data.faces).buffer), 1));
-  mesh.computeVertexNormals();
-  scene.add(new THREE.Mesh(mesh, new THREE.MeshLambertMaterial({vertexColors: THREE.VertexColors,
-    side: THREE.DoubleSide})));
+  mesh.setAttribute('normal', new THREE.BufferAttribute(new Int8Array(bytes(data.normals).buffer), 3, true));
+  if (data.texcoords) {
+    mesh.setAttribute('uv', new THREE.BufferAttribute(new Float32Array(bytes(data.texcoords).buffer), 2));
+  }
+  const loaded = address => {
+    const image = new Image(), texture = new THREE.Texture(image);
+    image.onload = () => { texture.needsUpdate = true; draw(); };
+    image.src = address;
+    return texture;
+  };
+  const surface = map => new THREE.MeshLambertMaterial({map, vertexColors: THREE.VertexColors,
+    side: THREE.DoubleSide});
+  let first = 0;
+  const surfaces = data.textures.map((part, i) => {
+    mesh.addGroup(first, 3 * part.faces, i);
+    first += 3 * part.faces;
+    const texture = loaded(part.picture);
+    texture.wrapS = texture.wrapT = THREE[part.wrap + 'Wrapping'];
+    return surface(texture);
+  });
+  mesh.addGroup(first, mesh.index.count - first, surfaces.length);
+  scene.add(new THREE.Mesh(mesh, surfaces.concat(surface(null))));
   const light = new THREE.DirectionalLight(0xffffff, 0.4);
   light.target.position.copy(pivot);
   scene.add(new THREE.AmbientLight(0xffffff, 0.65), light, light.target);
@@ -179,7 +200,7 @@ for (const model of document.querySelectorAll('.model')) {
       new THREE.LineBasicMaterial());
     scene.add(lines);
     if (camera.picture) {
-      const image = new Image(), texture = new THREE.Texture(image), plane = new THREE.BufferGeometry();
+      const texture = loaded(camera.picture), plane = new THREE.BufferGeometry();
       texture.generateMipmaps = false;
       texture.minFilter = THREE.LinearFilter;
       plane.setFromPoints(far);
@@ -187,8 +208,6 @@ for (const model of document.querySelectorAll('.model')) {
       plane.setIndex([0, 1, 2, 0, 2, 3]);
       scene.add(new THREE.Mesh(plane, new THREE.MeshBasicMaterial({map: texture, transparent: true, opacity: 0.6,
         side: THREE.DoubleSide, depthWrite: false})));
-      image.onload = () => { texture.needsUpdate = true; draw(); };
-      image.src = camera.picture;
     }
     const label = view.appendChild(document.createElement('span'));
     label.classList.toggle('other', camera.standsOut);

@@ -109,30 +109,61 @@ TEST_SUITE("unit") {
     CHECK(data["cameras"].empty());
   }
 
-  TEST_CASE("model: colours of faces stay sharp, a texture becomes colours of vertices") {
-    Model faces;
-    add_mesh(faces, dpr::make_cube());
-    CHECK(faces.positions.size() == 36);
-    CHECK(faces.colors[3] == dpr::make_cube().face_colors[1]);
+  TEST_CASE("model: colours of faces stay sharp, normals come from all faces around a vertex") {
+    Model model;
+    dpr::Mesh roof{.positions = {{0, 0, 0}, {0, 0, -1}, {-1, -1, 0}, {1, -1, 0}},
+                   .faces = {{0, 1, 2}, {0, 3, 1}},
+                   .vertex_colors = {},
+                   .face_colors = {{1, 0, 0}, {0, 1, 0}},
+                   .texcoords = {},
+                   .face_texcoords = {},
+                   .textures = {},
+                   .face_textures = {}};
+    add_mesh(model, roof);
+    REQUIRE(model.positions.size() == 6);
+    CHECK(model.colors[1] == glm::vec3(1, 0, 0));
+    CHECK(model.colors[3] == glm::vec3(0, 1, 0));
+    check_is(model.normals[0], {0, 1, 0});  // of the ridge
+    check_is(model.normals[2], glm::normalize(glm::vec3(-1, 1, 0)));
+    const auto normals = numbers_of<std::int8_t>(json::parse(model_data(model))["normals"]);
+    CHECK(normals[1] == 127);
+    CHECK(normals[6] == -90);
+    roof.face_colors.clear();
+    Model plain;
+    add_mesh(plain, roof);
+    CHECK(plain.positions.size() == 4);
+    CHECK(plain.colors[3] == glm::vec3(1));
+  }
+
+  TEST_CASE("model: faces are in the order of their textures, which lie in the page") {
     dpr::Mesh mesh;
-    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 5, 5}};
-    mesh.faces = {{0, 1, 2}};
-    mesh.vertex_colors = {{1, 1, 1}, {0.5F, 1, 1}, {1, 1, 1}, {0.25F, 0, 0}};
-    mesh.texcoords = {{0.1F, 0.1F}, {0.9F, 0.1F}, {1.1F, 0.9F}};
-    mesh.face_texcoords = {{0, 1, 2}};
-    // Rows from the top: red and green, then blue and white.
-    mesh.textures = {{2, 2, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}}}};
-    Model textured;
-    add_mesh(textured, mesh);
-    REQUIRE(textured.colors.size() == 4);
-    CHECK(textured.colors[0] == glm::vec3(0, 0, 1));
-    CHECK(textured.colors[1] == glm::vec3(0.5F, 1, 1));
-    CHECK(textured.colors[2] == glm::vec3(1, 0, 0));  // repeated
-    CHECK(textured.colors[3] == glm::vec3(0.25F, 0, 0));
-    mesh.textures[0].wrap = dpr::Wrap::mirror;
-    Model mirrored;
-    add_mesh(mirrored, mesh);
-    CHECK(mirrored.colors[2] == glm::vec3(0, 1, 0));
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    mesh.faces = {{0, 1, 2}, {2, 1, 0}, {1, 2, 0}};
+    mesh.texcoords = {{0, 0}, {1, 0}, {0, 1}, {0.5F, 2}};
+    mesh.face_texcoords = {{0, 1, 2}, {2, 1, 0}, {3, 2, 0}};
+    mesh.textures = {{2, 1, {{1, 0, 0}, {0, 1, 0}}, dpr::Wrap::mirror}, {1, 1, {{1, 1, 1}}}};
+    mesh.face_textures = {dpr::k_no_texture, 1, 0};
+    Model model;
+    add_mesh(model, dpr::make_icosphere(0));
+    const auto first = static_cast<std::uint32_t>(model.positions.size());
+    add_mesh(model, mesh);
+    CHECK(model.positions.size() == first + 4);  // the vertex with two texture coordinates is two
+    const json data = json::parse(model_data(model));
+    REQUIRE(data["textures"].size() == 2);
+    CHECK(data["textures"][0]["wrap"] == "MirroredRepeat");
+    CHECK(data["textures"][1]["wrap"] == "Repeat");
+    for (const json& texture : data["textures"]) {
+      CHECK(texture["faces"] == 1);
+      CHECK(texture["picture"].get<std::string>().starts_with("data:image/png;base64,"));
+    }
+    const auto faces = numbers_of<std::uint32_t>(data["faces"]);
+    CHECK(std::vector(faces.begin(), faces.begin() + 6) ==
+          std::vector<std::uint32_t>{first + 3, first + 2, first, first + 2, first + 1, first});
+    const auto texcoords = numbers_of<float>(data["texcoords"]);
+    CHECK(texcoords.size() == 2 * model.positions.size());
+    CHECK(texcoords[2 * (first + 3)] == 0.5F);
+    CHECK(texcoords[2 * (first + 3) + 1] == 2);
+    CHECK_FALSE(json::parse(model_data(cube_model())).contains("texcoords"));
   }
 
   TEST_CASE("model: a camera is a pyramid from its centre to the corners of its picture") {
@@ -226,10 +257,12 @@ TEST_SUITE("unit") {
   TEST_CASE("page: a model of too many triangles is left out, which the page says") {
     Model model = cube_model();
     model.faces.resize(dpr::cli::k_most_model_faces + 1);
+    model.face_textures.resize(model.faces.size(), dpr::k_no_texture);
     const std::string page = page_with(model);
     CHECK_FALSE(contains(page, "class=\"model\""));
     CHECK(contains(page, "it has 300001 triangles, and a page at most 300000") == has_three());
     model.faces.pop_back();
+    model.face_textures.pop_back();
     CHECK(contains(page_with(model), "class=\"model\"") == has_three());
   }
 }
