@@ -105,7 +105,7 @@ Model shape_model(const ShapeResult& result, const ShapeViews& views, const std:
          .name = "image " + std::to_string(i) + ", " + names[i] + (is_explained ? "" : ", not explained"),
          .stands_out = !is_explained});
   }
-  model.caption = "The shape and the cameras of the images, by number.";
+  model.caption = "The shape and the cameras of its images; pointing at a camera names its image.";
   if (!are_all_explained) model.caption += " Those whose image is not explained are red.";
   model.up = common_up(model.cameras);
   model.start = overview(model);

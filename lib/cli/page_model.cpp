@@ -150,7 +150,7 @@ Json camera_data(const ModelCamera& camera) {
 
 /// An orthographic view becomes one from far away. `tangents`: of what must be in sight to either side and upwards.
 Json start_to_json(const Viewpoint& start) {
-  constexpr float k_far = 20;  // heights of the picture
+  constexpr float k_far = 100;  // heights of the picture
   const float depth = start.camera.orthographic_height ? k_far * *start.camera.orthographic_height : 1.0F;
   const glm::mat4 to_world = glm::inverse(start.camera.view);
   glm::mat4 placed = to_world;

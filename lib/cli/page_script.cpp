@@ -48,6 +48,7 @@ figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
   white-space: nowrap; color: var(--text); }
 .model .view .other { color: var(--other); }
 .model .view .near { background: var(--page); z-index: 1; }
+.model .view .near.right { translate: -100% 0; }
 .model .view.many span:not(.near, .other) { display: none; }
 .model button { font: inherit; padding: 0.4em 1em; margin-top: 0.4em; }
 table { border-collapse: collapse; margin: 1em 0; }
@@ -102,7 +103,7 @@ for (const player of document.querySelectorAll('.player')) {
 for (const curves of document.querySelectorAll('.curves')) {
   const data = JSON.parse(curves.querySelector('script').textContent), picture = curves.querySelector('img');
   const place = curves.querySelector('.place'), values = curves.querySelector('.values');
-  const low = Math.min(...data.x), high = Math.max(...data.x);
+  const low = data.x.reduce((a, b) => Math.min(a, b)), high = data.x.reduce((a, b) => Math.max(a, b));
   let index = 0;
   const show = chosen => {
     index = Math.min(Math.max(chosen, 0), data.x.length - 1);
@@ -157,6 +158,7 @@ for (const model of document.querySelectorAll('.model')) {
   const scene = new THREE.Scene(), eye = new THREE.PerspectiveCamera();
   const pivot = vector(data.pivot), up = vector(data.up);
   const start = new THREE.Matrix4().fromArray(data.start.matrix);
+  const farthest = 20 * new THREE.Vector3().setFromMatrixPosition(start).distanceTo(pivot);
 
   const positions = new Float32Array(bytes(data.positions).buffer);
   const mesh = new THREE.BufferGeometry();
@@ -209,11 +211,11 @@ for (const model of document.querySelectorAll('.model')) {
       scene.add(new THREE.Mesh(plane, new THREE.MeshBasicMaterial({map: texture, transparent: true, opacity: 0.6,
         side: THREE.DoubleSide, depthWrite: false})));
     }
-    const label = view.appendChild(document.createElement('span'));
-    label.classList.toggle('other', camera.standsOut);
-    label.textContent = camera.label;
+    const tag = view.appendChild(document.createElement('span'));
+    tag.classList.toggle('other', camera.standsOut);
+    tag.textContent = camera.label;
     const centre = near.reduce((sum, corner) => sum.addScaledVector(corner, 0.25), new THREE.Vector3());
-    return {...camera, lines, label, centre};
+    return {...camera, lines, tag, centre};
   });
   view.classList.toggle('many', cameras.length > 16);
 
@@ -224,7 +226,7 @@ for (const model of document.querySelectorAll('.model')) {
     requestAnimationFrame(() => {
       isAsked = false;
       const distance = eye.position.distanceTo(pivot);
-      eye.near = distance / 200;
+      eye.near = Math.max(distance - 1.1 * reach, distance / 200);
       eye.far = distance + 1.1 * reach;
       eye.updateProjectionMatrix();
       eye.updateMatrixWorld();
@@ -233,10 +235,11 @@ for (const model of document.querySelectorAll('.model')) {
       for (const camera of cameras) {
         const place = camera.centre.clone().project(eye);
         camera.seen = Math.abs(place.z) < 1;
-        camera.label.hidden = !camera.seen;
+        camera.tag.hidden = !camera.seen;
         camera.left = (place.x + 1) / 2 * view.clientWidth;
         camera.top = (1 - place.y) / 2 * view.clientHeight;
-        camera.label.style.transform = `translate(${camera.left}px, ${camera.top}px)`;
+        camera.tag.style.transform = `translate(${camera.left}px, ${camera.top}px)`;
+        camera.tag.classList.toggle('right', place.x > 0);
       }
     });
   };
@@ -272,7 +275,7 @@ for (const model of document.querySelectorAll('.model')) {
   };
   const zoom = factor => {
     const offset = eye.position.clone().sub(pivot);
-    offset.setLength(Math.min(Math.max(offset.length() * factor, reach / 100), reach * 50));
+    offset.setLength(Math.min(Math.max(offset.length() * factor, farthest / 20000), farthest));
     eye.position.copy(pivot).add(offset);
     draw();
   };
@@ -281,8 +284,8 @@ for (const model of document.querySelectorAll('.model')) {
     const near = cameras.filter(camera => camera.seen && distance(camera) < 20)
       .sort((a, b) => distance(a) - distance(b))[0];
     for (const camera of cameras) {
-      camera.label.classList.toggle('near', camera === near);
-      camera.label.textContent = camera === near ? camera.name : camera.label;
+      camera.tag.classList.toggle('near', camera === near);
+      camera.tag.textContent = camera === near ? camera.name : camera.label;
     }
   };
 

@@ -203,8 +203,8 @@ TEST_SUITE("unit") {
     model.start.camera.intrinsics.reset();
     model.start.camera.orthographic_height = 2.0F;
     start = json::parse(model_data(model))["start"];
-    CHECK(start["matrix"][14].get<double>() == doctest::Approx(5 + 40));
-    CHECK(start["tangents"][1].get<double>() == doctest::Approx(1.0 / 40));
+    CHECK(start["matrix"][14].get<double>() == doctest::Approx(5 + 200));
+    CHECK(start["tangents"][1].get<double>() == doctest::Approx(1.0 / 200));
 
     for (int i = 0; i < 6; ++i)
       model.cameras.push_back({.camera = dpr::orbit_camera(5, 20, 60.0F * static_cast<float>(i))});

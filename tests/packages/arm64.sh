@@ -31,7 +31,7 @@ inside 'dpkg --add-architecture arm64 && apt-get update -qq'
 # PoCL needs a compiler of its own architecture, which takes the place of the cross compiler: it comes after the build.
 if [[ ! -e $root/dpr/build/demo/bin/dpr ]]; then
   install g++-aarch64-linux-gnu cmake ninja-build opencl-clhpp-headers libglm-dev libeigen3-dev nlohmann-json3-dev \
-    libcli11-dev gnuplot-nox ocl-icd-opencl-dev:arm64 libopenmesh-dev:arm64 libopenimageio-dev:arm64 libpng-dev:arm64
+    libcli11-dev gnuplot-nox libjs-three ocl-icd-opencl-dev:arm64 libopenmesh-dev:arm64 libopenimageio-dev:arm64 libpng-dev:arm64
   inside 'cd /dpr && cmake --preset demo -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 \
     -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DCMAKE_CXX_COMPILER=aarch64-linux-gnu-g++ && ninja -C build/demo dpr_cli'
 fi
