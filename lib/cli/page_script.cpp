@@ -59,8 +59,8 @@ th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
 )";
 }
 
-// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied into
-// its stage, and shown again whenever the slider moves.
+// The second picture of a wipe lies over the first, up to where the slider is. A row of the player's list is copied
+// into its stage, and shown again whenever the slider moves. The values of curves are those nearest to the pointer.
 std::string_view page_script() {
   return R"js(<script>
 for (const wipe of document.querySelectorAll('.wipe')) {
