@@ -18,7 +18,8 @@
 // in   pixels     of a view
 // in   views      that are summed
 // in   slots      a multiple of the widest vector
-// in   background RGB, which shows where the object does not, if the light has terms
+// in   background RGB, which shows where the object does not, if the light has terms; W: 1 where the target itself
+//                 shows there instead, which leaves a (the model over black - the target), with or without terms
 // in   active     uint[views]  the numbers of those that are summed, of all that there are
 // in   fits       float[view][DPR_FIT_LENGTH]  1 / scale^2 of the robust loss, 0: squares; [channel][term] light
 // in   colors     float4[view][pixel]  RGBA; if the light has terms without light, over black
@@ -46,10 +47,11 @@ kernel void normal_loss(const uint pixels, const uint views, const uint slots, c
     const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
     const Vec3n wanted = load_pixels(i, s.last, target).color;
 #if DPR_TERMS == 0
-    (void)normals, (void)background;
-    const Vec3n residual = sub3n(image.color, wanted);
+    (void)normals;
+    const realn compared = background.w == 0.0f ? (realn)(1.0f) : image.alpha;
+    const Vec3n residual = mad3n(wanted, -compared, image.color);
 #else
-    const Vec3n behind = splat3(background);
+    const Vec3n behind = behind_object(background, wanted);
     Vec3n residual = sub3n(behind, wanted);
     if (any_lane(image.alpha > 0.0f)) {
       const Facing facing = load_facing(i, s.last, normals + view * pixels);
@@ -102,8 +104,8 @@ kernel void normal_light(const uint pixels, const uint views, const uint slots, 
   for (uint i = s.first; i < s.last; i += s.step) {
     const PixelsN image = load_pixels(i, s.last, colors + view * pixels);
     if (!any_lane(image.alpha > 0.0f)) continue;  // there all terms are 0
-    const Vec3n behind = splat3(background);
-    const Vec3n wanted = mad3n(behind, image.alpha, sub3n(load_pixels(i, s.last, target).color, behind));
+    const Vec3n there = load_pixels(i, s.last, target).color, behind = behind_object(background, there);
+    const Vec3n wanted = mad3n(behind, image.alpha, sub3n(there, behind));
     const realn weight = load_run(lanes_before(s.last, i), i, residuals + (4 * view + 3) * pixels);
     const Facing facing = load_facing(i, s.last, normals + view * pixels);
     for (uint c = 0; c < DPR_FIT_CHANNELS; ++c) {
@@ -175,19 +177,22 @@ kernel void normal_counts(const uint pixels, const uint views, const uint slots,
 /// out  lit
 kernel void normal_lit(const uint pixels, const uint views, const float4 background,
                        global const float* restrict fits, global const float4* restrict colors,
-                       global const float4* restrict normals, global const float4* restrict tangents,
-                       global const float4* restrict normal_tangents, global float* restrict lit) {
+                       global const float4* restrict normals, global const float4* restrict target,
+                       global const float4* restrict tangents, global const float4* restrict normal_tangents,
+                       global float* restrict lit) {
   const Moved m = make_moved(pixels, views);
   if (m.image >= DPR_DIRECTIONS * views) return;
   const PixelsN moved = load_pixels(m.first, pixels, tangents + m.image * pixels);
+  const Vec3n wanted = load_pixels(m.first, pixels, target).color;
   Vec3n tangent = moved.color;
 #if DPR_TERMS == 0
-  (void)background, (void)fits, (void)colors, (void)normals, (void)normal_tangents;
+  (void)fits, (void)colors, (void)normals, (void)normal_tangents;
+  if (background.w != 0.0f) tangent = mad3n(wanted, -moved.alpha, tangent);
 #else
   const size_t view = m.view;
   global const float* light = fits + view * DPR_FIT_LENGTH + 1;
   const Facing facing = load_facing(m.first, pixels, normals + view * pixels);
-  tangent = mad3n(sub3n(light_at(light, DPR_FACTORS), splat3(background)), moved.alpha,
+  tangent = mad3n(sub3n(light_at(light, DPR_FACTORS), behind_object(background, wanted)), moved.alpha,
                   mul3n(tangent, shade(facing.basis, light)));
 #if DPR_FACTORS == DPR_HARMONICS
   // The derivative of n / |n| is a symmetric matrix: its product with a gradient is that with a tangent.

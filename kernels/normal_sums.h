@@ -62,6 +62,11 @@ static inline void store_planes(Vec3n v, uint first, uint last, uint pixels, glo
   store_run(v.z, first, last, planes + 2 * (size_t)pixels);
 }
 
+/// The background of normal_equations.cl.
+static inline Vec3n behind_object(float4 background, Vec3n target) {
+  return background.w == 0.0f ? splat3(background) : target;
+}
+
 static inline realn channel_of(Vec3n v, uint channel) {
   return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
 }

@@ -72,8 +72,13 @@ struct LeastSquares {
   /// More hypotheses are kept on the way.
   bool robust = false;
   /// Scale of the robust loss, a colour difference; 0: four standard deviations of what the best hypotheses
-  /// leave, from the median of its size, but between 0.1 and 0.12, anew at every level.
+  /// leave, from the median of its size, but between 0.1 and 0.12, anew at every level; 0.2 where the background is
+  /// unknown.
   float robust_scale = 0;
+  /// Anything may lie behind the object, as in a photograph: nothing is compared with the scene's background. A
+  /// pixel that the object does not cover leaves 0.7 of what one of quite another colour does. Takes a robust loss,
+  /// colours, and no silhouette.
+  bool unknown_background = false;
   /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
   /// not explain the target.
   PoseLight light = PoseLight::harmonics;
@@ -131,7 +136,8 @@ struct PoseOptions {
   /// In (0, 1): the target counts as explained once the loss is below that part of what is left without the
   /// pose, at the finest level: in descents by the initial pose; in least squares by the median over
   /// rotations, by the background alone, or by one colour everywhere, whichever is least; below the square
-  /// root of that part if the loss is robust, as that of depths without colours is. A search also needs every
+  /// root of that part if the loss is robust, as that of depths without colours is. Where the background is unknown,
+  /// of the pixels that the object covers, and of what these would leave uncovered. A search also needs every
   /// other pose to leave a quarter more, but for those that leave the same.
   float explained = 0.1F;
 };

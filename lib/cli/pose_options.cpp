@@ -29,6 +29,12 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
       "number; without one it follows from the residuals",
       "[FLOAT]")
       ->expected(0, 1);
+  command
+      .add_flag(
+          "--unknown-background", method.unknown_background,
+          "Anything may lie behind the object, as in a photograph: nothing is compared with the scene's "
+          "background. Implies --robust")
+      ->group(group);
   add("--light", options.light,
       "Light of the target: harmonics, by default, finds any distant light, gain one that differs in colour "
       "and brightness alone, where the scene's own light does not explain the target; fixed does not look",
@@ -41,7 +47,7 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
 
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options) {
   LeastSquares method = options.method;
-  method.robust = command.count("--robust") > 0;
+  method.robust = command.count("--robust") > 0 || method.unknown_background;
   method.light = static_cast<PoseLight>(position_of(options.light, light_names(), "--light (command line)"));
   return method;
 }

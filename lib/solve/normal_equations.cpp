@@ -45,7 +45,8 @@ NormalSums::NormalSums(const Device& device, const WeighedTarget& target, PoseLi
     : pixels_(target.colors.size()),
       terms_(terms_of(light)),
       directions_(directions),
-      background_{{target.background.x, target.background.y, target.background.z, 0}},
+      background_{{target.background.x, target.background.y, target.background.z,
+                   target.has_unknown_background ? 1.0F : 0.0F}},
       device_(device),
       launch_(impl_of(device), options(!target.measured.empty())),
       sums_(impl_of(device_), pixels_),
@@ -217,6 +218,7 @@ std::vector<NormalEquations> NormalSums::linearize(const HypothesisImages& image
                                                                         .fits = fits_,
                                                                         .colors = images.colors,
                                                                         .normals = images.normals,
+                                                                        .target = target_,
                                                                         .tangents = tangents.colors,
                                                                         .normal_tangents = tangents.normals,
                                                                         .lit = lit_});

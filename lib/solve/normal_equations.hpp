@@ -44,6 +44,7 @@ struct WeighedTarget {
   std::vector<cl_float4> colors;
   std::vector<float> weights;  ///< of colours, in [0, 1]; all 0: colours do not count
   glm::vec3 background{0.0F};
+  bool has_unknown_background = false;  ///< images are over black, and compared where they show the object
   /// Coverage, its weight, depth, its weight, these in [0, 1]; empty: neither.
   std::vector<cl_float4> measured{};
 };

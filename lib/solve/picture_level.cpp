@@ -83,8 +83,11 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
       colors_{Renderer(device)},
       counts_colors_(!target.pixels.empty()),
       trusts_coverage_(!options.robust && (counts_colors_ || !options.silhouette.image.pixels.empty())),
+      has_unknown_background_(options.unknown_background),
+      weighs_observations_(dpr::has_observations(options)),
       factors_{options.silhouette.weight, options.depth.weight} {
-  const Scene whole = level_scene(scene, space_, options, shape, light);
+  Scene whole = level_scene(scene, space_, options, shape, light);
+  if (has_unknown_background_) whole.background = glm::vec3(0);
   const std::vector<View> lenses = space_.seen_through_lenses(whole.camera);
   const auto show = [&](Images& images, const Scene& shown) {
     images.renderer.set_scene(subdivide_for_lens(shown, {}, lenses).scene);
@@ -97,6 +100,7 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
   if (!options.depth.image.pixels.empty())
     show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));
   target_.background = scene.background;
+  target_.has_unknown_background = has_unknown_background_;
   const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
                                                  : resample(options.mask, width(), height());
   if (counts_colors_) {
@@ -106,7 +110,7 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
     target_.colors.resize(mask.pixels.size());
     target_.weights.resize(mask.pixels.size());
   }
-  if (dpr::has_observations(options)) target_.measured = measured(options, mask);
+  if (weighs_observations_ || has_unknown_background_) target_.measured = measured(options, mask);
   sums_.emplace(device, target_, light, space_.size());
 }
 
@@ -135,6 +139,7 @@ std::vector<cl_float4> PictureLevel::measured(const LeastSquares& options, const
     silhouette = depth;
     for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
+  if (has_unknown_background_) silhouette = Image(width(), height(), glm::vec4(1));
   for (glm::vec4& p : silhouette.pixels) p.w = 1;
   if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
   if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
@@ -205,7 +210,13 @@ void PictureLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
     std::ranges::copy_if(sums_->scales(render(batch)), std::back_inserter(scales),
                          [](float scale) { return scale > 0; });
   });
-  scales_.color = best_of(std::move(scales));
+  set_color_scale(best_of(std::move(scales)));
+}
+
+void PictureLevel::set_color_scale(float scale) {
+  constexpr float k_uncovered = 0.7F;  // of the most that a pixel leaves
+  scales_.color = scale;
+  if (has_unknown_background_) scales_.measured[k_coverage] = {.weight = k_uncovered * scale * scale};
 }
 
 void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
@@ -215,7 +226,7 @@ void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
   // What residuals say beyond this, before the finest level, is how wrong the poses are.
   constexpr float k_most_coverage = 0.25F, k_most_of_pixel = 1;
-  if (!has_observations()) return;
+  if (!weighs_observations_) return;
   std::array<std::vector<float>, std::tuple_size_v<Deviations>> found;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
     for (const Deviations& deviations : sums_->deviations(render(batch))) {
@@ -227,7 +238,6 @@ void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   const float of_colors = best_of(found[0]);
   float of_coverage = std::max(best_of(found[1]), k_least_coverage);
   float of_depth = std::max(best_of(found[2]), k_least_of_pixel * pixel);
-  scales_.measured[k_coverage].scale = trusts_coverage_ ? 0 : k_coverage_scale;
   scales_.measured[k_depth].scale = k_scale * of_depth;
   if (!is_finest_) {
     of_coverage = std::min(of_coverage, k_most_coverage);
@@ -236,7 +246,10 @@ void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
   const bool counts_coverage =
       std::ranges::any_of(target_.measured, [](const cl_float4& m) { return m.s[1] > 0; });
   const float unit = of_colors > 0 ? of_colors : counts_coverage ? of_coverage : of_depth;
-  scales_.measured[k_coverage].weight = factors_[k_coverage] * std::pow(unit / of_coverage, 2.0F);
+  if (!has_unknown_background_) {
+    scales_.measured[k_coverage] = {.weight = factors_[k_coverage] * std::pow(unit / of_coverage, 2.0F),
+                                    .scale = trusts_coverage_ ? 0 : k_coverage_scale};
+  }
   scales_.measured[k_depth].weight = factors_[k_depth] * std::pow(unit / of_depth, 2.0F);
 }
 
@@ -285,10 +298,19 @@ double PictureLevel::blank_loss() {
     }
     return sum;
   };
-  const double blank = (std::min(loss_of(target_.background), loss_of(mean)) + observed) / sums_->total();
+  const double colors = has_unknown_background_ ? 0 : std::min(loss_of(target_.background), loss_of(mean));
+  const double blank = (colors + observed) / sums_->total();
   if (space_.body().is_alone()) return blank;
   const Hypothesis absent = space_.absent(scene_.camera);
   return std::min(blank, losses({&absent, 1}).front());
+}
+
+double PictureLevel::uncovered_loss(const Hypothesis& hypothesis) {
+  if (!has_unknown_background_) return 0;
+  LossScales covered = scales_;
+  covered.measured[k_coverage].weight = 0;
+  const HypothesisImages images = render({&hypothesis, 1});
+  return sums_->losses(images, scales_).front() - sums_->losses(images, covered).front();
 }
 
 }  // namespace dpr

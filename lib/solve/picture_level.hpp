@@ -46,13 +46,16 @@ class PictureLevel {
   /// from medians. Does nothing without either.
   void weigh_observations(std::span<const Hypothesis> hypotheses);
   bool has_observations() const { return !target_.measured.empty(); }
-  /// Scales of the losses; those of colours 0: squared differences.
+  /// Scales of the losses; those of colours 0: squared differences. Where the background is not known, a pixel that
+  /// shows it leaves a part of what one of quite another colour does.
   void set_scales(const LossScales& scales) { scales_ = scales; }
-  void set_color_scale(float scale) { scales_.color = scale; }
+  void set_color_scale(float scale);
   const LossScales& scales() const { return scales_; }
   /// The least loss of pictures without the object: the scene's background, the target's mean colour, and the meshes
   /// that stand still.
   double blank_loss();
+  /// Part of a hypothesis' loss that is of pixels which show something else; 0 where the background is known.
+  double uncovered_loss(const Hypothesis& hypothesis);
 
   std::size_t parameters() const { return space_.size(); }
   int width() const { return scene_.width / samples_; }
@@ -91,7 +94,8 @@ class PictureLevel {
   Images colors_;
   std::optional<Images> normals_, depths_;
   bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
-  std::array<float, 2> factors_;          // on the weights of coverage and depth
+  bool has_unknown_background_, weighs_observations_;
+  std::array<float, 2> factors_;  // on the weights of coverage and depth
   WeighedTarget target_;
   std::optional<NormalSums> sums_;
   LossScales scales_;

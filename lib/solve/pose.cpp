@@ -65,7 +65,8 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
   validate_meshes(scene_, options_.meshes);
   validate(scene_);
   const auto* least_squares = std::get_if<LeastSquares>(&options_.method);
-  if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares)) {
+  if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares) ||
+      least_squares->unknown_background) {
     require_size(target_, scene_, "target");
     checks::require_pixels(target_, "target (pose)");
   }

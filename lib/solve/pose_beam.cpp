@@ -93,8 +93,10 @@ void set_robust_scale(PoseLevel& level, const LeastSquares& method, std::span<co
   // Tighter, the loss would see nothing but what hypotheses on their way hit by chance. Wider, as the
   // residuals of wrong hypotheses have it, clutter would count.
   constexpr float k_least_robust_scale = 0.1F, k_most_robust_scale = 0.12F;
-  if (method.robust_scale > 0) {
-    level.set_color_scale(method.robust_scale);
+  // There is no clutter but what is in front.
+  constexpr float k_unknown_background_scale = 0.2F;
+  if (method.robust_scale > 0 || method.unknown_background) {
+    level.set_color_scale(method.robust_scale > 0 ? method.robust_scale : k_unknown_background_scale);
     return;
   }
   level.estimate_scale(hypotheses);

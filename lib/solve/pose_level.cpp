@@ -103,11 +103,17 @@ double PoseLevel::blank_loss() {
   return sum / static_cast<double>(pictures_.size());
 }
 
+double PoseLevel::uncovered_loss(const Hypothesis& hypothesis) {
+  double sum = 0;
+  for (PictureLevel& picture : pictures_) sum += picture.uncovered_loss(hypothesis);
+  return sum / static_cast<double>(pictures_.size());
+}
+
 std::vector<double> PoseLevel::blank_parts(const Hypothesis& hypothesis) {
   std::vector<double> parts;
   for (PictureLevel& picture : pictures_) {
-    const double blank = picture.blank_loss();
-    parts.push_back(blank > 0 ? picture.losses({&hypothesis, 1}).front() / blank : 1);
+    const double uncovered = picture.uncovered_loss(hypothesis), blank = picture.blank_loss() - uncovered;
+    parts.push_back(blank > 0 ? (picture.losses({&hypothesis, 1}).front() - uncovered) / blank : 1);
   }
   return parts;
 }

@@ -49,7 +49,8 @@ class PoseLevel {
   /// The mean of the pictures'.
   float color_scale() const;
   double blank_loss();
-  /// [picture] Loss in parts of a blank one's.
+  double uncovered_loss(const Hypothesis& hypothesis);
+  /// [picture] Loss in parts of a blank one's, of both without what is not covered.
   std::vector<double> blank_parts(const Hypothesis& hypothesis);
 
   int width() const { return pictures_.front().width(); }

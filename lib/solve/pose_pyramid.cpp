@@ -79,6 +79,12 @@ void validate(const LeastSquares& options, const Scene& scene) {
   validate_factor(options.silhouette.weight, "silhouette_weight (pose)");
   validate_factor(options.depth.weight, "depth_weight (pose)");
   if (options.box) validate_box(*options.box, scene);
+  if (options.unknown_background && !options.robust)
+    throw InvalidArgument("unknown background (pose)", "a loss that is not robust", "a robust one");
+  if (options.unknown_background && !is_empty(options.silhouette.image)) {
+    throw InvalidArgument("unknown background (pose)", "a silhouette, which tells the background apart",
+                          "one of the two");
+  }
 }
 
 std::vector<LevelShape> level_shapes(const Scene& scene, const LeastSquares& options) {

@@ -110,18 +110,22 @@ FittedPose Fit::run() {
   add_initial();
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
-  if (anywhere_) try_half_turns(level);
+  if (method_.rotations > 0) try_half_turns(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scales(level.scales());
   wrong_ = wrong_loss(sampled);
   const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
   finish(level);
-  const double blank = sampled.blank_loss(), unexplained = std::min(wrong_, blank);
+  // Where the background is not known, a wrong pose is told by the pixels that it covers.
+  const double uncovered = level.uncovered_loss(candidates_.front().hypothesis);
+  const double blank = sampled.blank_loss(),
+               unexplained = method_.unknown_background ? blank : std::min(wrong_, blank);
   const bool is_robust = method_.robust || (!has_colors_ && !method_.depth.image.pixels.empty());
   if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
-  if (unexplained > 0) result_.unexplained_part = result_.loss / unexplained;
-  if (result_.loss < explained_part(options_.explained, is_robust) * unexplained) {
+  if (unexplained > uncovered)
+    result_.unexplained_part = (result_.loss - uncovered) / (unexplained - uncovered);
+  if (result_.unexplained_part < explained_part(options_.explained, is_robust)) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
   } else {
     result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;

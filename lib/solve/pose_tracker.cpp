@@ -76,11 +76,15 @@ struct PoseTracker::Impl {
     return options.search_interval > 0 && misses % options.search_interval == 0 &&
            options.method.rotations > 0;
   }
-  double explained_below() {
-    return explained_part(options.explained, options.method.robust) * levels->unexplained(levels->size() - 1);
+  double explained_below(const Hypothesis& hypothesis) {
+    const double uncovered = levels->finest().uncovered_loss(hypothesis);
+    return uncovered + explained_part(options.explained, options.method.robust) *
+                           (levels->unexplained(levels->size() - 1) - uncovered);
   }
-  bool is_explained(const Candidate& candidate) { return candidate.equations.loss < explained_below(); }
-  double share(const Candidate& candidate) { return candidate.equations.loss / explained_below(); }
+  /// The candidate's loss of that which is allowed.
+  double share(const Candidate& candidate) {
+    return candidate.equations.loss / explained_below(candidate.hypothesis);
+  }
 
   TrackedPose first(const Image& frame);
   void make_levels(const Pose& near, const Image& frame);
@@ -176,8 +180,7 @@ std::optional<Candidate> PoseTracker::Impl::follow() {
   constexpr double k_unusual = 4, k_not_small = 0.25;
   const Pose expected = motion.next();
   const Candidate candidate = follow_from(first_level(), expected);
-  if (share(candidate) < std::max(k_unusual * usual_share, k_not_small) && is_explained(candidate))
-    return candidate;
+  if (share(candidate) < std::min(1.0, std::max(k_unusual * usual_share, k_not_small))) return candidate;
   std::vector<Candidate> candidates{{{expected}}, {{motion.last()}}, candidate};
   descend(candidates, k_narrow_beam);
   return judged(candidates);
@@ -197,7 +200,7 @@ std::optional<Candidate> PoseTracker::Impl::judged(const std::vector<Candidate>&
   const Candidate& best = candidates.front();
   least_loss = std::min(least_loss, best.equations.loss);
   const double enough = enough_to_equal(best.equations.loss, levels->unexplained(levels->size() - 1));
-  if (!is_explained(best) || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
+  if (share(best) >= 1 || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
   const Hypothesis expected{motion.next()};
   const Candidate* nearest = &best;
   for (const Candidate& c : candidates) {
@@ -260,7 +263,7 @@ TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candi
   TrackedPose tracked{.status = status,
                       .pose = pivot.to_origin(pose),
                       .loss = candidate.equations.loss,
-                      .explained_below = explained_below()};
+                      .explained_below = explained_below(candidate.hypothesis)};
   if (options.covariance) {
     tracked.covariance = pose_covariance(levels->finest(), levels->space(), candidate.hypothesis);
     pivot.to_origin(pose, tracked.covariance);
@@ -271,7 +274,9 @@ TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candi
 TrackedPose PoseTracker::Impl::missed() {
   ++misses;
   motion.miss();
-  return {.pose = pivot.to_origin(motion.guess()), .loss = least_loss, .explained_below = explained_below()};
+  return {.pose = pivot.to_origin(motion.guess()),
+          .loss = least_loss,
+          .explained_below = explained_below({motion.guess()})};
 }
 
 PoseTracker::PoseTracker(Device device, const Scene& scene, TrackOptions options)
