@@ -54,7 +54,7 @@ class PictureLevel {
   /// The least loss of pictures without the object: the scene's background, the target's mean colour, and the meshes
   /// that stand still.
   double blank_loss();
-  /// Part of a hypothesis' loss that is of pixels which show something else; 0 where the background is known.
+  /// The part of a hypothesis' loss that pixels leave which it does not cover; 0 where the background is known.
   double uncovered_loss(const Hypothesis& hypothesis);
 
   std::size_t parameters() const { return space_.size(); }

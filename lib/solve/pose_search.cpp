@@ -128,7 +128,7 @@ FittedPose Fit::run() {
   if (result_.unexplained_part < explained_part(options_.explained, is_robust)) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
   } else {
-    result_.doubt = blank <= wrong_ ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
+    result_.doubt = unexplained == blank ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
   }
   result_.explained = result_.doubt == PoseDoubt::none;
   return {std::move(result_), normals_, level.color_scale(), finest.samples,
