@@ -57,6 +57,26 @@ Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals norma
   return result;
 }
 
+/// Part of every pixel, in images of a level's size, that may show the object: that which lies in the box, or close to
+/// it, as boxes are not exact; all without one.
+Image allowed(const std::optional<PoseBox>& box, const Scene& scene, int width, int height) {
+  constexpr float k_slack = 0.03F;  // of the larger side
+  Image image(width, height, glm::vec4(1));
+  if (!box) return image;
+  const glm::vec2 scale = glm::vec2(width, height) / glm::vec2(scene.width, scene.height);
+  const float slack = k_slack * std::max(box->width, box->height);
+  const glm::vec2 low = scale * (glm::vec2(box->x, box->y) - slack);
+  const glm::vec2 high = scale * (glm::vec2(box->x + box->width, box->y + box->height) + slack);
+  for (int row = 0; row < height; ++row) {
+    for (int column = 0; column < width; ++column) {
+      const glm::vec2 at(column, row);
+      const glm::vec2 shared = glm::clamp(glm::min(at + 1.0F, high) - glm::max(at, low), 0.0F, 1.0F);
+      image.at(column, row) = glm::vec4(shared.x * shared.y);
+    }
+  }
+  return image;
+}
+
 /// That of one of sixteen is less: the very best may fit by luck. Empty: 0.
 float best_of(std::vector<float> numbers) {
   constexpr std::ptrdiff_t k_best = 16;
@@ -111,6 +131,13 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
     target_.weights.resize(mask.pixels.size());
   }
   if (weighs_observations_ || has_unknown_background_) target_.measured = measured(options, mask);
+  if (has_unknown_background_) {
+    const Image wanted = allowed(options.box, scene, width(), height());
+    for (std::size_t i = 0; i < wanted.pixels.size(); ++i) {
+      target_.measured[i].s[2 * k_coverage] = wanted.pixels[i].x;
+      target_.measured[i].s[2 * k_coverage + 1] = mask.pixels[i].x;
+    }
+  }
   sums_.emplace(device, target_, light, space_.size());
 }
 
@@ -139,7 +166,6 @@ std::vector<cl_float4> PictureLevel::measured(const LeastSquares& options, const
     silhouette = depth;
     for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
-  if (has_unknown_background_) silhouette = Image(width(), height(), glm::vec4(1));
   for (glm::vec4& p : silhouette.pixels) p.w = 1;
   if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
   if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
@@ -215,6 +241,7 @@ void PictureLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
 
 void PictureLevel::set_color_scale(float scale) {
   constexpr float k_uncovered = 0.7F;  // of the most that a pixel leaves
+      std::getenv("KU") ? static_cast<float>(std::atof(std::getenv("KU"))) : 0.7F;
   scales_.color = scale;
   if (has_unknown_background_) scales_.measured[k_coverage] = {.weight = k_uncovered * scale * scale};
 }

@@ -61,6 +61,7 @@ class Fit {
   void choose_normals(const LevelShape& shape);
   LevelShape final_shape(LevelShape shape) const;
   bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
+  bool fills_picture(double uncovered, double blank) const;
   float light_gain(PoseLevel& level, const LevelShape& shape) const;
   void rescale(PoseLevel& level);
   void set_scales(PoseLevel& level, std::span<const Hypothesis> hypotheses) const;
@@ -117,7 +118,6 @@ FittedPose Fit::run() {
   wrong_ = wrong_loss(sampled);
   const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
   finish(level);
-  // Where the background is not known, a wrong pose is told by the pixels that it covers.
   const double uncovered = level.uncovered_loss(candidates_.front().hypothesis);
   const double blank = sampled.blank_loss(),
                unexplained = method_.unknown_background ? blank : std::min(wrong_, blank);
@@ -125,7 +125,8 @@ FittedPose Fit::run() {
   if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
   if (unexplained > uncovered)
     result_.unexplained_part = (result_.loss - uncovered) / (unexplained - uncovered);
-  if (result_.unexplained_part < explained_part(options_.explained, is_robust)) {
+  if (!fills_picture(uncovered, blank) &&
+      result_.unexplained_part < explained_part(options_.explained, is_robust)) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
   } else {
     result_.doubt = unexplained == blank ? PoseDoubt::empty_picture : PoseDoubt::wrong_poses;
@@ -133,6 +134,14 @@ FittedPose Fit::run() {
   result_.explained = result_.doubt == PoseDoubt::none;
   return {std::move(result_), normals_, level.color_scale(), finest.samples,
           blank > 0 ? unexplained / blank : 1};
+}
+
+/// True if the object covers nearly all that is compared, and nothing says that it does: before a background that is
+/// not known, anything of few colours explains a picture so.
+bool Fit::fills_picture(double uncovered, double blank) const {
+  constexpr double k_little = 0.1;
+  return method_.unknown_background && !method_.box && method_.mask.pixels.empty() &&
+         uncovered < k_little * blank;
 }
 
 /// Through all levels but the last; `found` come in again where they were given up. Returns what was found if

@@ -1,11 +1,14 @@
 // Poses before a background that nothing is known of.
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
+#include <vector>
 
 #include "dpr/pose_tracker.hpp"
+#include "solve/pose_level.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
@@ -117,6 +120,38 @@ TEST_SUITE("pipeline") {
       CHECK_FALSE(absent.explained);
       CHECK(absent.unexplained_part > 0.4);
     }
+  }
+
+  TEST_CASE(
+      "an object before its own colour belongs in its box, and is not explained where it fills the picture") {
+    if (is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene();
+    scene.camera.view = glm::translate(glm::mat4(1), glm::vec3(0, 0, -6));
+    const dpr::Pose far{glm::dmat3(1), glm::dvec3(0)}, near{glm::dmat3(1), {0, 0, 3.5}};
+    const dpr::Image target = dpr::test::rigid_image(device, placed(scene, near));  // one side alone
+    dpr::LeastSquares method = before_anything(dpr::PoseLight::fixed);
+    method.rotations = 0;
+    const dpr::PoseOptions options{.method = method, .solve_translation = true};
+    const dpr::PoseResult filling = dpr::PoseSolver(device, scene, target, options).solve(near);
+    CHECK(filling.unexplained_part < 0.05);
+    CHECK_FALSE(filling.explained);
+    CHECK(filling.doubt == dpr::PoseDoubt::empty_picture);
+
+    const dpr::PoseSpace space(scene, far, options);
+    const std::array<dpr::Hypothesis, 2> hypotheses{{{far}, {{far.rotation, {0, 0, 1.5}}}}};
+    const auto losses = [&] {
+      dpr::PoseLevel level(device, {scene, target, method}, space, {scene.height, method.blur},
+                           dpr::PoseLight::fixed, dpr::CornerNormals::parted);
+      level.set_color_scale(0.2F);
+      return level.losses(hypotheses);
+    };
+    const std::vector<double> anywhere = losses();
+    CHECK(anywhere[1] < 0.8 * anywhere[0]);
+    method.box = dpr::PoseBox{22.6F, 18.6F, 34.8F, 34.8F};  // the side from afar
+    const std::vector<double> boxed = losses();
+    CHECK(boxed[0] < 0.2 * anywhere[0]);
+    CHECK(boxed[1] > 3 * boxed[0]);
   }
 
   TEST_CASE("an object is tracked before a background that is not the scene's") {
