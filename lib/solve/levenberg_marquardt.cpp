@@ -7,7 +7,8 @@
 namespace dpr {
 namespace {
 
-constexpr double k_still_deviations = 0.3;  // steps shorter than this part of the pose's uncertainty change nothing
+constexpr double k_still_deviations =
+    0.3;  // steps shorter than this part of the pose's uncertainty change nothing
 // Parts of the loss: what a step gains where no more is to be had, and what one loses that goes too far about the least.
 constexpr double k_little_gain = 1e-4, k_little_loss = 1e-2;
 // Steps like its last by which a candidate may reach the best one.

@@ -41,7 +41,8 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
 
 struct Turns {
   unsigned enough, most;
-  bool is_end = false;  ///< of the work on candidates: what only another turn would need is not found in the last one
+  bool is_end =
+      false;  ///< of the work on candidates: what only another turn would need is not found in the last one
 };
 
 /// Turns every candidate until it stands still or often enough, and on as long as the best still falls, all
