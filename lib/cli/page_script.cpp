@@ -52,7 +52,7 @@ figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
 .model .view.many span:not(.near, .other) { display: none; }
 .model button { font: inherit; padding: 0.4em 1em; margin-top: 0.4em; }
 table { border-collapse: collapse; margin: 1em 0; }
-td, th { padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line);
+td, th { min-width: 3.5em; padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line);
   font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
 th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
 </style>

@@ -81,6 +81,9 @@ struct PoseTracker::Impl {
     return uncovered + explained_part(options.explained, options.method.robust) *
                            (levels->unexplained(levels->size() - 1) - uncovered);
   }
+  bool is_explained(const Candidate& candidate) {
+    return candidate.equations.loss < explained_below(candidate.hypothesis);
+  }
   /// The candidate's loss of that which is allowed.
   double share(const Candidate& candidate) {
     return candidate.equations.loss / explained_below(candidate.hypothesis);
@@ -180,7 +183,8 @@ std::optional<Candidate> PoseTracker::Impl::follow() {
   constexpr double k_unusual = 4, k_not_small = 0.25;
   const Pose expected = motion.next();
   const Candidate candidate = follow_from(first_level(), expected);
-  if (share(candidate) < std::min(1.0, std::max(k_unusual * usual_share, k_not_small))) return candidate;
+  if (share(candidate) < std::max(k_unusual * usual_share, k_not_small) && is_explained(candidate))
+    return candidate;
   std::vector<Candidate> candidates{{{expected}}, {{motion.last()}}, candidate};
   descend(candidates, k_narrow_beam);
   return judged(candidates);
@@ -200,7 +204,7 @@ std::optional<Candidate> PoseTracker::Impl::judged(const std::vector<Candidate>&
   const Candidate& best = candidates.front();
   least_loss = std::min(least_loss, best.equations.loss);
   const double enough = enough_to_equal(best.equations.loss, levels->unexplained(levels->size() - 1));
-  if (share(best) >= 1 || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
+  if (!is_explained(best) || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
   const Hypothesis expected{motion.next()};
   const Candidate* nearest = &best;
   for (const Candidate& c : candidates) {
