@@ -23,6 +23,8 @@ std::size_t most_at(const Beam& beam, std::size_t level);
 /// Candidates whose losses differ by no more than this part of what a wrong pose leaves are equals: the pixels' grid
 /// makes that much of one pose or its symmetric twin.
 inline constexpr double k_equal_losses = 1e-3;
+/// What a pose must cover of what is compared, before a background that is not known, to explain anything.
+inline constexpr double k_least_covered = 1e-3;
 
 /// The last level of a search changes less than those before it.
 inline constexpr Hope k_hope{3, 0.02}, k_last_hope{1.5, 0.005};

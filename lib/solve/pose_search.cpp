@@ -123,7 +123,7 @@ FittedPose Fit::run() {
                unexplained = method_.unknown_background ? blank : std::min(wrong_, blank);
   const bool is_robust = method_.robust || (!has_colors_ && !method_.depth.image.pixels.empty());
   if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
-  if (unexplained > uncovered)
+  if (unexplained - uncovered > k_least_covered * unexplained)
     result_.unexplained_part = (result_.loss - uncovered) / (unexplained - uncovered);
   if (!fills_picture(uncovered, blank) &&
       result_.unexplained_part < explained_part(options_.explained, is_robust)) {

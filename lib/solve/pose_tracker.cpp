@@ -76,10 +76,12 @@ struct PoseTracker::Impl {
     return options.search_interval > 0 && misses % options.search_interval == 0 &&
            options.method.rotations > 0;
   }
+  /// 0 of a hypothesis that covers nothing where the background is not known.
   double explained_below(const Hypothesis& hypothesis) {
-    const double uncovered = levels->finest().uncovered_loss(hypothesis);
-    return uncovered + explained_part(options.explained, options.method.robust) *
-                           (levels->unexplained(levels->size() - 1) - uncovered);
+    const double unexplained = levels->unexplained(levels->size() - 1);
+    const double uncovered = levels->finest().uncovered_loss(hypothesis), covered = unexplained - uncovered;
+    if (covered <= k_least_covered * unexplained) return 0;
+    return uncovered + explained_part(options.explained, options.method.robust) * covered;
   }
   bool is_explained(const Candidate& candidate) {
     return candidate.equations.loss < explained_below(candidate.hypothesis);

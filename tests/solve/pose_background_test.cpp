@@ -137,6 +137,10 @@ TEST_SUITE("pipeline") {
     CHECK(filling.unexplained_part < 0.05);
     CHECK_FALSE(filling.explained);
     CHECK(filling.doubt == dpr::PoseDoubt::empty_picture);
+    const dpr::PoseResult outside =
+        dpr::PoseSolver(device, scene, target, options).solve({far.rotation, {20, 0, 0}});
+    CHECK(outside.unexplained_part == 1);
+    CHECK_FALSE(outside.explained);
 
     const dpr::PoseSpace space(scene, far, options);
     const std::array<dpr::Hypothesis, 2> hypotheses{{{far}, {{far.rotation, {0, 0, 1.5}}}}};
