@@ -83,13 +83,11 @@ struct PoseTracker::Impl {
     if (covered <= k_least_covered * unexplained) return 0;
     return uncovered + explained_part(options.explained, options.method.robust) * covered;
   }
-  bool is_explained(const Candidate& candidate) {
-    return candidate.equations.loss < explained_below(candidate.hypothesis);
-  }
-  /// The candidate's loss of that which is allowed.
+  /// The loss in parts of what is allowed: below 1 if it explains the frame; no number if nothing is left or allowed.
   double share(const Candidate& candidate) {
     return candidate.equations.loss / explained_below(candidate.hypothesis);
   }
+  bool is_explained(const Candidate& candidate) { return share(candidate) < 1; }
 
   TrackedPose first(const Image& frame);
   void make_levels(const Pose& near, const Image& frame);
@@ -185,8 +183,8 @@ std::optional<Candidate> PoseTracker::Impl::follow() {
   constexpr double k_unusual = 4, k_not_small = 0.25;
   const Pose expected = motion.next();
   const Candidate candidate = follow_from(first_level(), expected);
-  if (share(candidate) < std::max(k_unusual * usual_share, k_not_small) && is_explained(candidate))
-    return candidate;
+  const double part = share(candidate);
+  if (part < 1 && part < std::max(k_unusual * usual_share, k_not_small)) return candidate;
   std::vector<Candidate> candidates{{{expected}}, {{motion.last()}}, candidate};
   descend(candidates, k_narrow_beam);
   return judged(candidates);
@@ -255,11 +253,11 @@ std::optional<Candidate> PoseTracker::Impl::best_everywhere() {
 TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candidate) {
   constexpr double k_newest = 0.2;  // its weight in the mean
   const Pose& pose = candidate.hypothesis.pose;
+  const double below = explained_below(candidate.hypothesis), part = candidate.equations.loss / below;
   const bool is_followed = status == TrackStatus::tracked;
   surprise = is_followed ? levels->space().distance({motion.next()}, candidate.hypothesis)
                          : std::numeric_limits<double>::infinity();
-  usual_share = is_followed && usual_share > 0 ? (1 - k_newest) * usual_share + k_newest * share(candidate)
-                                               : share(candidate);
+  usual_share = is_followed && usual_share > 0 ? (1 - k_newest) * usual_share + k_newest * part : part;
   if (is_followed) {
     motion.follow(pose);
   } else {
@@ -269,7 +267,7 @@ TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candi
   TrackedPose tracked{.status = status,
                       .pose = pivot.to_origin(pose),
                       .loss = candidate.equations.loss,
-                      .explained_below = explained_below(candidate.hypothesis)};
+                      .explained_below = below};
   if (options.covariance) {
     tracked.covariance = pose_covariance(levels->finest(), levels->space(), candidate.hypothesis);
     pivot.to_origin(pose, tracked.covariance);
