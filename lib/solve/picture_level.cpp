@@ -241,7 +241,6 @@ void PictureLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {
 
 void PictureLevel::set_color_scale(float scale) {
   constexpr float k_uncovered = 0.7F;  // of the most that a pixel leaves
-      std::getenv("KU") ? static_cast<float>(std::atof(std::getenv("KU"))) : 0.7F;
   scales_.color = scale;
   if (has_unknown_background_) scales_.measured[k_coverage] = {.weight = k_uncovered * scale * scale};
 }
