@@ -89,7 +89,7 @@ static inline int is_outside(const BlurPass p, global const uint2* restrict exte
   const int first = max(rows.x / DPR_TILE - 1, 0),
             last = min((rows.y - 1) / DPR_TILE + 1, (int)p.tile_rows - 1);
   for (int row = first; row <= last; ++row) {
-    const int2 extent = as_int2(extents[image * p.tile_rows + (uint)row]);
+    const int2 extent = as_int2(extents[image % p.views * p.tile_rows + (uint)row]);
     if (columns.x < extent.y && columns.y > extent.x) return 0;
   }
   return 1;

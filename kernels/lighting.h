@@ -165,20 +165,51 @@ static inline PointGradient zero_point_gradient(void) {
   return g;
 }
 
+/// Adds the gradients through the environment at a point.
+static inline void harmonics_backward(const LightingParams lp, Vec3n normal, Vec3n grad_factor,
+                                      PointGradient* point) {
+  realn grad_basis[DPR_HARMONICS];
+#pragma unroll
+  for (int k = 0; k < DPR_HARMONICS; ++k) grad_basis[k] = dot3n(grad_factor, splat3(lp.harmonics[k]));
+  point->normal = mad3n(harmonic_basis_backward(normal, grad_basis), (realn)(1.0f), point->normal);
+}
+
 /// Adds the gradients through the light at a point.
 static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
                                         float shininess, float4 eye, Vec3n position, Vec3n normal,
                                         Vec3n grad_factor, Vec3n grad_specular, PointGradient* point) {
-  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
-    realn grad_basis[DPR_HARMONICS];
-#pragma unroll
-    for (int k = 0; k < DPR_HARMONICS; ++k) grad_basis[k] = dot3n(grad_factor, splat3(lp.harmonics[k]));
-    point->normal = mad3n(harmonic_basis_backward(normal, grad_basis), (realn)(1.0f), point->normal);
-  }
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) harmonics_backward(lp, normal, grad_factor, point);
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
     light_term_backward(t, eye, lights + l, shininess, normal, grad_factor, grad_specular, point, &unused);
+  }
+}
+
+/// A vector's component, 0 in the others.
+static inline Vec3n component3n(Vec3n v, int channel) {
+  const realn none = 0.0f;
+  return make_vec3n(channel == 0 ? v.x : none, channel == 1 ? v.y : none, channel == 2 ? v.z : none);
+}
+
+/// Adds the gradients of each channel of a colour, base * factor + coefficient * specular, through the light at a
+/// point.
+static inline void light_point_rows(const LightingParams lp, global const Light* restrict lights,
+                                    float shininess, float4 eye, Vec3n position, Vec3n normal, Vec3n base,
+                                    Vec3n coefficient, PointGradient point[3]) {
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
+#pragma unroll
+    for (int channel = 0; channel < 3; ++channel)
+      harmonics_backward(lp, normal, component3n(base, channel), point + channel);
+  }
+  LightGradient unused = zero_light_gradient();
+  for (uint l = 0; l < lp.lights; ++l) {
+    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
+#pragma unroll
+    for (int channel = 0; channel < 3; ++channel) {
+      light_term_backward(t, eye, lights + l, shininess, normal, component3n(base, channel),
+                          component3n(coefficient, channel), point + channel, &unused);
+    }
   }
 }
 

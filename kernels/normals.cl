@@ -150,12 +150,17 @@ kernel void normals_given_backward(const FrameParams p, global const float4* res
   grad_values[value] = (float4)(sum, 0.0f);
 }
 
-/// Tangents of the normals of vertices. One work-item per (view, vertex).
+/// Tangents of the normals of vertices: they turn with the mesh where its positions do not move by themselves. One
+/// work-item per (view, vertex).
 /// in   faces, corner_starts, corners, world  as normals_forward left them
-/// in out  tangents  float4[direction][...]  of vertices' normals by those of world positions
+/// in   vertex_mesh     uint[vertex]
+/// in   model_tangents  ModelTangent[direction][view][mesh]
+/// in out  tangents     float4[direction][...]  of vertices' normals by those of world positions
 kernel void normals_tangent(const FrameParams p, const TangentParams q, global const uint4* restrict faces,
                             global const uint* restrict corner_starts, global const uint* restrict corners,
-                            global const float4* restrict world, global float4* restrict tangents) {
+                            global const float4* restrict world, global const uint* restrict vertex_mesh,
+                            global const ModelTangent* restrict model_tangents,
+                            global float4* restrict tangents) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
@@ -163,6 +168,12 @@ kernel void normals_tangent(const FrameParams p, const TangentParams q, global c
   const float4 n = world[normal_at(p, view, vertex)];
   for (uint d = 0; d < q.directions; ++d) {
     global float4* const moved = tangents + world_tangents_at(p, d);
+    if (q.positions == 0) {
+      const float4 turn =
+          model_tangents[((size_t)d * p.views + view) * p.meshes + vertex_mesh[vertex]].rotation;
+      moved[normal_at(p, view, vertex)] = (float4)(cross(turn.xyz, n.xyz), 0.0f);
+      continue;
+    }
     float3 sum = 0.0f;
     for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k)
       sum += face_normal_tangent(positions, moved + view * p.vertices, faces[corners[k] / 3]);

@@ -226,7 +226,6 @@ typedef struct TangentParams {
   uint positions, colors; /* how many there are of a direction; 0: none changes, and none is read */
   uint lit;               /* tangents of the world are found, for light and attributes */
   uint base_plane;        /* of base colours where light falls on them, else of colours */
-  uint channel;           /* of the colour */
   uint first;             /* of the directions, among the images' */
 } TangentParams;
 
@@ -247,7 +246,8 @@ typedef struct BlurPass {
   uint out_length, in_length; /* pixels along the pass */
   int out_step, in_step, offset, taps;
   uint tile_rows;   /* of an image's samples, whose extents are known; 0: they are not */
-  uint image_lines; /* the rest is read where they are. Along rows: rows of an image */
+  uint views;       /* the rest is read where they are. Image i has the extents of view i % views */
+  uint image_lines; /* along rows: rows of an image */
   /* Input i along the pass, and across it, is made of samples i * step + first to i * step + end - 1. */
   int along_step, along_first, along_end, across_step, across_first, across_end;
   /* Along columns: where the launch's work-items end; the rows of inputs that there are, the others are added

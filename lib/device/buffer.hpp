@@ -110,13 +110,11 @@ class Buffer {
   }
 
   /// Copies everything on the device, to where `other` has room for it from element `first` on.
-  void copy_to(Buffer& other, std::size_t first = 0) const { copy_to(other, 0, size(), first); }
-  /// The same of `count` elements from `from` on.
-  void copy_to(Buffer& other, std::size_t from, std::size_t count, std::size_t first) const {
-    if (count == 0) return;
-    check_cl(device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, from * sizeof(T), first * sizeof(T),
-                                              count * sizeof(T)),
-             "clEnqueueCopyBuffer");
+  void copy_to(Buffer& other, std::size_t first = 0) const {
+    if (size() == 0) return;
+    check_cl(
+        device_->queue.enqueueCopyBuffer(buffer_, other.buffer_, 0, first * sizeof(T), size() * sizeof(T)),
+        "clEnqueueCopyBuffer");
   }
 
   /// Throws std::logic_error where only the device knows.

@@ -191,25 +191,22 @@ void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t
   const std::size_t sample_count = samples.size() / channels,
                     of_direction = pixels.size() / directions.size(), pixel_count = of_direction / channels;
   own_samples_.upload(on, samples);
-  own_group_.resize(on, sample_count);
   move_in_groups(directions, [&](std::size_t first_direction, std::size_t count) {
     own_tangents_.upload(on,
                          sample_tangents.subspan(first_direction * samples.size(), count * samples.size()));
     own_pixels_.resize(on, count * of_direction);
     for (std::size_t first = 0; first < channels; first += 4) {
+      own_group_.resize(on, sample_count);
       made_exchange().give(group_of(own_samples_, first, channels), sample_count,
                            vectors_of(own_group_, 0, 4));
       pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
-      for (std::size_t d = 0; d < count; ++d) {
-        FloatVectors from = group_of(own_tangents_, first, channels),
-                     to = group_of(own_pixels_, first, channels);
-        from.first += d * samples.size();
-        to.first += d * of_direction;
-        made_exchange().give(from, sample_count, vectors_of(own_group_, 0, 4));
-        pixel_noise->smooth_tangent(contour_inputs(), image_size(), d, tangents, own_group_, own_image_,
-                                    aggregate.scratch(frame));
-        made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
-      }
+      own_group_.resize(on, count * sample_count);
+      made_exchange().give(group_of(own_tangents_, first, channels), count * sample_count,
+                           vectors_of(own_group_, 0, 4));
+      pixel_noise->smooth_tangent(contour_inputs(), image_size(), tangents, own_group_, own_image_,
+                                  aggregate.scratch(frame));
+      made_exchange().give(vectors_of(own_image_, 0, 4), count * pixel_count,
+                           group_of(own_pixels_, first, channels));
     }
     own_pixels_.download(pixels.subspan(first_direction * of_direction, count * of_direction));
   });

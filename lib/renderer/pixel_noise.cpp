@@ -127,11 +127,21 @@ void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& sam
   antialias.backward(in, contour, other_kept_, grad_samples, {kept_grad_, scratch});
 }
 
-void PixelNoise::smooth_tangent(const ContourInputs& in, const Blur::Size& size, std::size_t direction,
-                                const Tangents& tangents, Buffer<cl_float4>& samples,
-                                Buffer<cl_float4>& pixels, Buffer<float>& scratch) {
-  antialias.tangent(in, contour, other_kept_, direction, tangents, samples, {kept_grad_, scratch});
-  blur_forward(size, samples, pixels, true);
+namespace {
+
+/// Images of all directions, one after the other.
+Blur::Size along_all(Blur::Size size, const Tangents& tangents) {
+  size.views *= tangents.params.directions;
+  return size;
+}
+
+}  // namespace
+
+void PixelNoise::smooth_tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
+                                Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels,
+                                Buffer<float>& scratch) {
+  antialias.tangent(in, contour, other_kept_, tangents, samples, {kept_grad_, scratch});
+  blur_forward(along_all(size, tangents), samples, pixels, true);
   blur_holds_image_ = false;
 }
 
@@ -159,23 +169,20 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
 
 void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents,
                          Buffer<float>& scratch) {
-  const std::size_t samples = std::size_t{in.p.views} * in.p.width * in.p.height;
-  const std::size_t pixels = size.views * size.width * size.height;
-  moved_raster_.resize(device_, samples);
-  for (std::size_t d = 0; d < tangents.params.directions; ++d) {
-    tangents.rasters.copy_to(moved_raster_, d * samples, samples, 0);
-    antialias.tangent(in, contour, kept_, d, tangents, moved_raster_, {kept_grad_, scratch});
-    blur_forward(size, moved_raster_, moved_image_, false);
-    moved_image_.copy_to(tangents.images, (tangents.first + d) * pixels);
-  }
+  antialias.tangent(in, contour, kept_, tangents, tangents.rasters, {kept_grad_, scratch});
+  const Blur::Size all = along_all(size, tangents);
+  const std::size_t view_pixels = size.views * size.width * size.height;
+  const bool are_all = tangents.images.size() == tangents.params.directions * view_pixels;
+  Buffer<cl_float4>& moved = are_all ? tangents.images : moved_image_;
+  blur_forward(all, tangents.rasters, moved, false);
+  if (!are_all) moved.copy_to(tangents.images, tangents.first * view_pixels);
   blur_holds_image_ = false;
 }
 
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
          (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
-         grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes() + moved_raster_.capacity_bytes() +
-         moved_image_.capacity_bytes();
+         grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes() + moved_image_.capacity_bytes();
 }
 
 void Renderer::Impl::find_edges() {

@@ -83,12 +83,12 @@ class PixelNoise {
                        Buffer<float>& scratch);
 
   /// From the tangents of the samples that smooth() took last, which are blended in place, to those of its pixels,
-  /// along one of a group's directions.
-  void smooth_tangent(const ContourInputs& in, const Blur::Size& size, std::size_t direction,
-                      const Tangents& tangents, Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels,
-                      Buffer<float>& scratch);
+  /// along a group's directions.
+  void smooth_tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
+                      Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels, Buffer<float>& scratch);
 
-  /// From the tangents of the samples, `tangents.rasters`, to those of the image, along a group's directions.
+  /// From the tangents of the samples, `tangents.rasters`, which are blended in place, to those of the image, along
+  /// a group's directions.
   void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents, Buffer<float>& scratch);
   /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
   Buffer<cl_float4>& room(const shared::FrameParams& p, std::size_t count) {
@@ -112,10 +112,10 @@ class PixelNoise {
                     bool is_whole);
 
   KeptSamples kept_, other_kept_;
-  Buffer<cl_float4> grad_raster_;                 // where it has not taken the raster's place
-  Buffer<cl_float4> kept_grad_;                   // of a whole frame's samples; see room()
-  Buffer<cl_float4> moved_raster_, moved_image_;  // tangents along one direction
-  bool is_blended_ = false;                       // the raster is
+  Buffer<cl_float4> grad_raster_;  // where it has not taken the raster's place
+  Buffer<cl_float4> kept_grad_;    // of a whole frame's samples; see room()
+  Buffer<cl_float4> moved_image_;  // tangents along a group's directions, where there are several groups
+  bool is_blended_ = false;        // the raster is
   bool raster_is_gradient_ = false;
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image
   Device::Impl& device_;

@@ -186,17 +186,19 @@ void Antialias::backward(const ContourInputs& in, const Contour& contour, const 
 }
 
 void Antialias::tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-                        std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples,
+                        const Tangents& tangents, Buffer<cl_float4>& samples,
                         const AntialiasScratch& scratch) {
   if (!tangent_) tangent_.emplace(device_);
   // What the backward pass has of cuts and samples holds their tangents; seconds follow the cuts.
   const TileLaunch all = launch_around(in.p, {}, 0);
-  const BufferRef<cl_float2> cut_tangents = cuts_in(device_, scratch, 2 * pixels_of(in.p) + seconds.size());
+  const cl_uint directions = tangents.params.directions;
+  const BufferRef<cl_float2> cut_tangents =
+      cuts_in(device_, scratch, directions * (2 * pixels_of(in.p) + seconds.size()));
   Buffer<cl_float4>& faded_tangents = scratch.samples;
-  faded_tangents.resize(device_, pixels_of(in.p));
+  faded_tangents.resize(device_, directions * pixels_of(in.p));
   (*tangent_)(contour.pairs, kernel::antialias_cross_tangent{
                                  .p = in.p,
-                                 .direction_pairs = cl_uint2{{to_uint(direction), to_uint(contour.pairs)}},
+                                 .directions_pairs = cl_uint2{{directions, to_uint(contour.pairs)}},
                                  .edges = in.edges.edges,
                                  .faces = in.geometry.face_vertices,
                                  .ndc = in.transform.ndc,
@@ -210,6 +212,7 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                  .outlines = tangents.outlines,
                                  .cut_tangents = cut_tangents});
   (*tangent_)(all.items, kernel::antialias_fade_tangent{.p = all.p,
+                                                        .directions = directions,
                                                         .tile_starts = contour.tile_starts,
                                                         .winner = winner,
                                                         .cut = cut,
@@ -218,6 +221,7 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                                         .raster_tangents = samples,
                                                         .faded_tangents = faded_tangents});
   (*tangent_)(all.items, kernel::antialias_blend_tangent{.p = all.p,
+                                                         .directions = directions,
                                                          .tile_starts = contour.tile_starts,
                                                          .winner = winner,
                                                          .cut = cut,
@@ -226,6 +230,7 @@ void Antialias::tangent(const ContourInputs& in, const Contour& contour, const K
                                                          .faded_tangents = faded_tangents,
                                                          .tangents = samples});
   (*tangent_)(all.items, kernel::antialias_second_tangent{.p = all.p,
+                                                          .directions = directions,
                                                           .tile_starts = contour.tile_starts,
                                                           .counts = second_counts,
                                                           .seconds = seconds,

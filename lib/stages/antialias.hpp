@@ -24,7 +24,7 @@ struct KeptSamples {
 };
 
 /// Memory of others that backward() and tangent() may write to: of samples, and of four floats a sample at the
-/// least.
+/// least; tangent() makes both as large as its directions need.
 struct AntialiasScratch {
   Buffer<cl_float4>& samples;
   Buffer<float>& cuts;
@@ -50,11 +50,10 @@ class Antialias {
   void backward(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
                 Buffer<cl_float4>& grad, const AntialiasScratch& scratch,
                 const std::optional<Range>& wanted = {});
-  /// From the tangents of the samples to those of the blended ones, in place, along one of the directions. `kept`
-  /// as forward() leaves it.
+  /// From the tangents of the samples, [direction][sample], to those of the blended ones, in place. `kept` as
+  /// forward() leaves it.
   void tangent(const ContourInputs& in, const Contour& contour, const KeptSamples& kept,
-               std::size_t direction, const Tangents& tangents, Buffer<cl_float4>& samples,
-               const AntialiasScratch& scratch);
+               const Tangents& tangents, Buffer<cl_float4>& samples, const AntialiasScratch& scratch);
 
   /// Rows of tiles around those that are wanted in which samples have to be there.
   static constexpr std::size_t k_rows_around = 6;
@@ -62,6 +61,10 @@ class Antialias {
   static constexpr std::size_t k_sample_bytes =
       sizeof(float) + 3 * sizeof(cl_uint) + 2 * sizeof(cl_float2) +
       DPR_SECOND_CROSSINGS * (sizeof(shared::SecondCrossing) + sizeof(cl_float2)) / (2 * DPR_TILE) + 1;
+
+  /// Bytes a sample and direction of what tangent() writes beside the samples.
+  static constexpr std::size_t k_tangent_bytes =
+      sizeof(cl_float4) + 2 * sizeof(cl_float2) + DPR_SECOND_CROSSINGS * sizeof(cl_float2) / (2 * DPR_TILE);
 
   Buffer<float> front;         ///< [sample] view depth, infinite where nothing hides; only near contours
   Buffer<cl_uint> front_face;  ///< [sample] view * faces + face of what is there

@@ -117,6 +117,7 @@ void Blur::find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& til
   extents_.resize(device_, rows);
   launch_(rows, kernel::blur_extents{.p = p, .tile_starts = tile_starts, .extents = extents_});
   tile_rows_ = p.tiles_y;
+  extent_views_ = p.views;
 }
 
 Blur::Footprint Blur::Footprint::through(const Pass& pass) const {
@@ -132,6 +133,7 @@ Blur::Footprint Blur::input_footprint(const Axis& axis) const {
 Blur::Pass Blur::within_extents(Pass pass, const Footprint& along, const Footprint& across,
                                 std::size_t image_lines) const {
   pass.tile_rows = static_cast<cl_uint>(tile_rows_);
+  pass.views = extent_views_;
   pass.image_lines = static_cast<cl_uint>(image_lines);
   pass.along_step = along.step;
   pass.along_first = along.first;

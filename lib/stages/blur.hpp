@@ -29,7 +29,8 @@ class Blur {
   const BlurKernel& kernel() const { return now_.kernel; }
 
   /// Finds the covered part of the rasters that follow, which need not be all alike: the tiles that have
-  /// pairs. Elsewhere nothing is summed up. Until then all of a raster may differ.
+  /// pairs. Elsewhere nothing is summed up. Until then all of a raster may differ. Where more images follow than
+  /// there are views, each has the extents of its view: tangents along several directions.
   void find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts);
 
   void forward(const Size& size, const Buffer<cl_float4>& raster, Buffer<cl_float4>& image);
@@ -133,7 +134,8 @@ class Blur {
   Buffer<float> products_;
   Buffer<cl_uint2> extents_;   ///< [view][row of tiles], in samples
   std::size_t tile_rows_ = 0;  ///< 0 while the extents are not known
-  Buffer<cl_uint> starts_;     ///< of the views' products
+  cl_uint extent_views_ = 1;
+  Buffer<cl_uint> starts_;  ///< of the views' products
   std::size_t starts_stride_ = 0;
 };
 

@@ -180,6 +180,8 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
                                                 .corner_starts = in.geometry.vertex_corners.starts,
                                                 .corners = in.geometry.vertex_corners.corners,
                                                 .world = in.transform.world,
+                                                .vertex_mesh = in.geometry.vertex_mesh,
+                                                .model_tangents = tangents.models,
                                                 .tangents = tangents.world});
   if (given.empty()) return;
   now_.kernels->normals(in.p.views * given.count,
@@ -194,15 +196,11 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
 void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
   const bool is_textured = !in.geometry.textures.empty();
   const Range pairs = in.rasterize.pairs(in.bin);
-  SurfaceTangentArguments all{arguments(in), tangents.params, tangents.colors,   tangents.world,
-                              tangents.ndc,  tangents.clip,   tangents.fragments};
-  if (is_textured) surface->tangent(all, pairs);
-  if (lit()) {
-    if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
-    (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
-    for (all.q.channel = 0; all.q.channel < 3; ++all.q.channel)
-      (*now_.kernels->tangent)(pairs, kernel::shade_lit_place_tangent::pick(all));
-  } else if (!is_textured) {
+  const SurfaceTangentArguments all{arguments(in), tangents.params, tangents.colors,   tangents.world,
+                                    tangents.ndc,  tangents.clip,   tangents.fragments};
+  if (is_textured) {
+    surface->tangent(all, pairs);
+  } else if (!lit() || tangents.params.colors != 0) {
     const PairGroups groups = in.rasterize.pair_groups(in.bin);
     launch_(groups.count, kernel::shade_tangent{.p = in.p,
                                                 .range = groups.pairs,
@@ -216,6 +214,9 @@ void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
                                                 .fragments = in.rasterize.values,
                                                 .tangents = tangents.fragments});
   }
+  if (!lit()) return;
+  if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
+  (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
 }
 
 std::size_t Shade::bytes() const {

@@ -38,8 +38,7 @@ class LitShading {
            kernel::normals_given_tangent>
       normals;
   Launcher<kernel::shade_lit_forward, kernel::shade_lit_backward, kernel::shade_lit_backward_lights> shade;
-  std::optional<Launcher<kernel::shade_lit_tangent, kernel::shade_lit_place_tangent>>
-      tangent;  // made when first asked for
+  std::optional<Launcher<kernel::shade_lit_tangent>> tangent;  // made when first asked for
 };
 
 /// Everything of a frame that shading reads.
