@@ -20,3 +20,4 @@
 #include "antialias_fade.cl"
 #include "aggregate_tangent.cl"
 #include "blur.cl"
+#include "blur_scale.cl"

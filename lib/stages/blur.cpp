@@ -6,12 +6,15 @@
 namespace dpr {
 namespace {
 
-/// As kernels/blur.cl has them: outputs of a work-item along its pass, in vectors along rows; pixels of a
-/// vector.
+/// As kernels/blur.h has them: outputs of a work-item along its pass, in vectors along rows; pixels of a
+/// vector; blocks beside each other.
 std::size_t block_of(const Device::Impl& device) { return device.info.lanes == 1 ? 4 : 8; }
 constexpr std::size_t k_row_block = 4;
 std::size_t pixels_of_vector(const Device::Impl& device) {
   return std::max<std::size_t>(1, device.info.lanes / 4);
+}
+std::size_t pixels_of_blocks(const Device::Impl& device) {
+  return (device.info.lanes == 1 ? 1 : 4) * pixels_of_vector(device);
 }
 
 std::size_t groups(std::size_t items, std::size_t group) { return (items + group - 1) / group; }
@@ -103,13 +106,13 @@ shared::BlurPass Blur::expansion(const Axis& axis) const {
 }
 
 std::size_t Blur::column_items(const Pass& pass, std::size_t width) const {
-  return groups(pass.out_length, block_of(device_)) * vectors_of_row(width);
+  return groups(pass.out_length, block_of(device_)) * items_of_row(width);
 }
 
-std::size_t Blur::vectors_of_row(std::size_t width) const { return groups(width, pixels_of_vector(device_)); }
+std::size_t Blur::items_of_row(std::size_t width) const { return groups(width, pixels_of_blocks(device_)); }
 
 std::size_t Blur::row_items(const Pass& pass) const {
-  return groups(pass.out_length, k_row_block * pixels_of_vector(device_));
+  return groups(pass.out_length, k_row_block * pixels_of_blocks(device_));
 }
 
 void Blur::find_extents(const shared::FrameParams& p, const Buffer<cl_uint>& tile_starts) {
@@ -192,12 +195,12 @@ void Blur::part_of_columns(Pass pass, std::size_t views, std::size_t width, cons
   set_columns(pass, views, width);
   out.resize(device_, lines.count * width);
   pass.out_shift = static_cast<cl_uint>(lines.first * width);
-  const std::size_t length = pass.out_length, block = block_of(device_), vectors = vectors_of_row(width);
+  const std::size_t length = pass.out_length, block = block_of(device_), of_row = items_of_row(width);
   const std::size_t blocks_of_image = groups(length, block);
   for (std::size_t view = lines.first / length; view * length < lines.last(); ++view) {
     const Range rows = lines_of_image(lines, view, length);
-    const Range items((view * blocks_of_image + rows.first / block) * vectors,
-                      groups(rows.count, block) * vectors);
+    const Range items((view * blocks_of_image + rows.first / block) * of_row,
+                      groups(rows.count, block) * of_row);
     pass.items = items.last();
     launch_(items,
             kernel::blur_columns{.p = pass, .extents = extents_, .weights = weights, .in = in, .out = out});

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernels/blur.hpp"
+#include "kernels/blur_scale.hpp"
 #include "smoothing/blur_kernel.hpp"
 #include "stages/reduce.hpp"
 
@@ -114,9 +115,9 @@ class Blur {
   Pass within_extents(Pass pass, const Footprint& along, const Footprint& across,
                       std::size_t image_lines = 1) const;
   void upload_starts(std::size_t views, std::size_t stride);
-  /// Work-items of a pass of one image's columns, and of one row.
+  /// Work-items of a pass of one image's columns, of a block of their rows, and of one row.
   std::size_t column_items(const Pass& pass, std::size_t width) const;
-  std::size_t vectors_of_row(std::size_t width) const;
+  std::size_t items_of_row(std::size_t width) const;
   std::size_t row_items(const Pass& pass) const;
 
   Device::Impl& device_;
