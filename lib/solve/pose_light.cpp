@@ -31,9 +31,21 @@ ChannelLight solve_light(const LightSums& sums) {
   prior[last] += part * whole;
   Eigen::MatrixXd normal = sums.normal;
   normal.diagonal() += prior;
+  Eigen::VectorXd right = sums.right;
   ChannelLight result;
-  result.inverse = normal.llt().solve(Eigen::MatrixXd::Identity(last + 1, last + 1));
-  result.light = result.inverse * sums.right;
+  const auto solve = [&] {
+    result.inverse = normal.llt().solve(Eigen::MatrixXd::Identity(last + 1, last + 1));
+    result.light = result.inverse * right;
+  };
+  solve();
+  if (result.light[0] < 0) {  // it would make a negative of the colours: there is none of it
+    normal.row(0).setZero();
+    normal.col(0).setZero();
+    normal(0, 0) = 1;
+    right[0] = 0;
+    solve();
+    result.inverse(0, 0) = 0;
+  }
   if (sums.sum.dot(result.light) < 0) result.light.setZero();  // light takes nothing away
   result.prior_loss = result.light.cwiseAbs2().dot(prior);
   result.seen = whole;

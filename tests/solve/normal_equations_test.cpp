@@ -223,8 +223,13 @@ class Reference {
     prior.segment(1, last - 1).array() += part * normal(0, 0);
     prior[last] += part * normal(last, last);
     normal.diagonal() += prior;
+    const Vector right = t.transpose() * weights_.asDiagonal() * wanted;
     inverses_[c] = normal.inverse();
-    lights_[c] = inverses_[c] * (t.transpose() * weights_.asDiagonal() * wanted);
+    if ((inverses_[c] * right)[0] < 0) {  // without the first term
+      inverses_[c].setZero();
+      inverses_[c].bottomRightCorner(last, last) = normal.bottomRightCorner(last, last).inverse();
+    }
+    lights_[c] = inverses_[c] * right;
     if ((weights_.asDiagonal() * t * lights_[c]).sum() < 0) lights_[c].setZero();
     prior_loss_ += lights_[c].cwiseAbs2().dot(prior);
   }
@@ -301,6 +306,28 @@ TEST_SUITE("unit") {
           }
         }
       }
+    }
+  }
+
+  TEST_CASE("normal equations: no light makes a negative's colours") {
+    for (const PoseLight light : {PoseLight::gain, PoseLight::harmonics}) {
+      CAPTURE(static_cast<int>(light));
+      Case c(77, 6, light, 0);
+      std::mt19937 engine(3);
+      for (cl_float4& color : c.target.colors) {
+        const float value = engine() % 2 == 0 ? 0.1F : 0.9F;
+        color = {{value, value, value, 1}};
+      }
+      for (std::size_t i = 0; i < c.colors.size(); ++i) {
+        const float negative = 1 - c.target.colors[i % c.pixels].s[0];
+        c.colors[i] = {{negative, negative, negative, 1}};
+      }
+      Run run(c, test::test_device());
+      const std::vector<double> negative = run.sums.losses(run.images, {});
+      CHECK(negative[0] > 0.1);  // variance of 0.1 and 0.9: 0.16
+      for (std::size_t i = 0; i < c.pixels; ++i) c.target.colors[i] = c.colors[i];
+      Run same(c, test::test_device());
+      CHECK(same.sums.losses(same.images, {})[0] < 0.01);
     }
   }
 
