@@ -186,33 +186,6 @@ static inline void light_point_backward(const LightingParams lp, global const Li
   }
 }
 
-/// A vector's component, 0 in the others.
-static inline Vec3n component3n(Vec3n v, int channel) {
-  const realn none = 0.0f;
-  return make_vec3n(channel == 0 ? v.x : none, channel == 1 ? v.y : none, channel == 2 ? v.z : none);
-}
-
-/// Adds the gradients of each channel of a colour, base * factor + coefficient * specular, through the light at a
-/// point.
-static inline void light_point_rows(const LightingParams lp, global const Light* restrict lights,
-                                    float shininess, float4 eye, Vec3n position, Vec3n normal, Vec3n base,
-                                    Vec3n coefficient, PointGradient point[3]) {
-  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
-#pragma unroll
-    for (int channel = 0; channel < 3; ++channel)
-      harmonics_backward(lp, normal, component3n(base, channel), point + channel);
-  }
-  LightGradient unused = zero_light_gradient();
-  for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
-#pragma unroll
-    for (int channel = 0; channel < 3; ++channel) {
-      light_term_backward(t, eye, lights + l, shininess, normal, component3n(base, channel),
-                          component3n(coefficient, channel), point + channel, &unused);
-    }
-  }
-}
-
 /// Adds the gradients of a light at a point.
 static inline void add_light_gradient(global const Light* light, float shininess, float4 eye, Vec3n position,
                                       Vec3n normal, Vec3n grad_factor, Vec3n grad_specular,

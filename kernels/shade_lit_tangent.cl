@@ -16,30 +16,68 @@ typedef struct {
   Vec3n position[DPR_LIT_POINTS], normal[DPR_LIT_POINTS], eye;
 } LitPoints;
 
-/// The channels' derivatives, of a colour at these weights of corners 1 and 2.
+/// Channels whose derivatives are held at once: a GPU has no registers for all.
+#if DPR_LANES == 1
+#define DPR_CHANNELS_AT_ONCE 1
+#else
+#define DPR_CHANNELS_AT_ONCE 3
+#endif
+
+static inline realn component3n(Vec3n v, int channel) {
+  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
+}
+
+/// A vector's component, 0 in the others.
+static inline Vec3n only3n(Vec3n v, int channel) {
+  const realn none = 0.0f;
+  return make_vec3n(channel == 0 ? v.x : none, channel == 1 ? v.y : none, channel == 2 ? v.z : none);
+}
+
+/// Adds the gradients of the channels from `first` on of base * factor + coefficient * specular, through the light at
+/// a point.
+static inline void light_point_rows(const LightingParams lp, global const Light* restrict lights,
+                                    float shininess, float4 eye, Vec3n position, Vec3n normal, Vec3n base,
+                                    Vec3n coefficient, int first, PointGradient* point) {
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
+#pragma unroll
+    for (int k = 0; k < DPR_CHANNELS_AT_ONCE; ++k)
+      harmonics_backward(lp, normal, only3n(base, first + k), point + k);
+  }
+  LightGradient unused = zero_light_gradient();
+  for (uint l = 0; l < lp.lights; ++l) {
+    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
+#pragma unroll
+    for (int k = 0; k < DPR_CHANNELS_AT_ONCE; ++k) {
+      light_term_backward(t, eye, lights + l, shininess, normal, only3n(base, first + k),
+                          only3n(coefficient, first + k), point + k, &unused);
+    }
+  }
+}
+
+/// The derivatives of the channels from `first` on, of a colour at these weights of corners 1 and 2.
 static inline void rows_of_points(const Surface s, const LightingParams lp,
                                   global const Light* restrict lights, const SurfacePoint at, realn c1,
-                                  realn c2, LitPoints row[3]) {
+                                  realn c2, int first, LitPoints row[DPR_CHANNELS_AT_ONCE]) {
 #pragma unroll
-  for (int channel = 0; channel < 3; ++channel) row[channel].eye = zero3n();
+  for (int channel = 0; channel < DPR_CHANNELS_AT_ONCE; ++channel) row[channel].eye = zero3n();
 #pragma unroll
   for (int k = 0; k < DPR_LIT_POINTS; ++k) {
-    PointGradient g[3];
+    PointGradient g[DPR_CHANNELS_AT_ONCE];
 #pragma unroll
-    for (int channel = 0; channel < 3; ++channel) {
+    for (int channel = 0; channel < DPR_CHANNELS_AT_ONCE; ++channel) {
       g[channel] = zero_point_gradient();
       g[channel].eye = row[channel].eye;
     }
     if (DPR_SHADING == DPR_GOURAUD) {
       const realn share = k == 0 ? 1.0f - c1 - c2 : k == 1 ? c1 : c2;
       light_point_rows(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], scale3n(at.base, share),
-                       scale3n(splat3(s.material), share), g);
+                       scale3n(splat3(s.material), share), first, g);
     } else {
       light_point_rows(lp, lights, s.material.w, s.eye, at.position, at.normal, at.base, splat3(s.material),
-                       g);
+                       first, g);
     }
 #pragma unroll
-    for (int channel = 0; channel < 3; ++channel) {
+    for (int channel = 0; channel < DPR_CHANNELS_AT_ONCE; ++channel) {
       row[channel].position[k] = g[channel].position;
       row[channel].normal[k] = g[channel].normal;
       row[channel].eye = g[channel].eye;
@@ -137,33 +175,37 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
     const realn c1 = load_run(in_run, i + DPR_PLANE(p, BARY), fragments),
                 c2 = load_run(in_run, i + DPR_PLANE(p, BARY) + p.fragments, fragments);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2, load_base(p, in_run, i, fragments));
-    LitPoints row[3];
-    rows_of_points(s, lp, lights, f.at, c1, c2, row);
 #pragma unroll 1
-    for (uint d = 0; d < q.directions; ++d) {
-      global float* const of = tangents + (size_t)d * q.planes * plane;
-      const realn moved1 = load_run(in_run, i + bary, of), moved2 = load_run(in_run, i + bary + plane, of);
-      Vec3n base;
-      if (DPR_BASE == DPR_BASE_OF_FRAGMENTS) {
-        base = load_run3(in_run, i + DPR_TANGENT_PLANE_BASE * plane, plane, of);
-      } else if (q.colors != 0) {
-        base = make_vec3n(load_own_run(last + color, i + color, of),
-                          load_own_run(last + color + plane, i + color + plane, of),
-                          load_own_run(last + color + 2 * plane, i + color + 2 * plane, of));
-      } else {
-        base = along_corners(s.color, moved1, moved2);
+    for (int first = 0; first < 3; first += DPR_CHANNELS_AT_ONCE) {
+      LitPoints row[DPR_CHANNELS_AT_ONCE];
+      rows_of_points(s, lp, lights, f.at, c1, c2, first, row);
+#pragma unroll 1
+      for (uint d = 0; d < q.directions; ++d) {
+        global float* const of = tangents + (size_t)d * q.planes * plane;
+        const realn moved1 = load_run(in_run, i + bary, of), moved2 = load_run(in_run, i + bary + plane, of);
+        const Vec3n base = DPR_BASE == DPR_BASE_OF_FRAGMENTS
+                               ? load_run3(in_run, i + DPR_TANGENT_PLANE_BASE * plane, plane, of)
+                               : along_corners(s.color, moved1, moved2);
+        Vec3n of_light = zero3n();
+        if (DPR_SHADING == DPR_GOURAUD) {
+          of_light = mul3n(f.at.base, along_corners(s.factor, moved1, moved2));
+          of_light = mad3n(mul3n(splat3(s.material), along_corners(s.specular, moved1, moved2)),
+                           (realn)(1.0f), of_light);
+        }
+        const LitPoints moved =
+            moved_points(s, f.at, load_place_tangent(p, d, view_face, faces, world, world_tangents), c1, c2,
+                         moved1, moved2);
+#pragma unroll
+        for (int k = 0; k < DPR_CHANNELS_AT_ONCE; ++k) {
+          const uint out = color + (uint)(first + k) * plane;
+          const int has_own = DPR_BASE == DPR_BASE_OF_CORNERS && q.colors != 0;
+          const realn of_base =
+              has_own ? load_own_run(last + out, i + out, of) : component3n(base, first + k);
+          store_run(component3n(f.lit.factor, first + k) * of_base + component3n(of_light, first + k) +
+                        along_points(row[k], moved),
+                    i + out, last + out, of);
+        }
       }
-      Vec3n sum = mul3n(f.lit.factor, base);
-      if (DPR_SHADING == DPR_GOURAUD) {
-        const Vec3n factor = along_corners(s.factor, moved1, moved2),
-                    specular = along_corners(s.specular, moved1, moved2);
-        sum = mad3n(mul3n(f.at.base, factor), (realn)(1.0f), sum);
-        sum = mad3n(mul3n(splat3(s.material), specular), (realn)(1.0f), sum);
-      }
-      const LitPoints moved = moved_points(
-          s, f.at, load_place_tangent(p, d, view_face, faces, world, world_tangents), c1, c2, moved1, moved2);
-      store_run3(sum.x + along_points(row[0], moved), sum.y + along_points(row[1], moved),
-                 sum.z + along_points(row[2], moved), i, last, color, plane, of);
     }
   }
 }
