@@ -21,21 +21,11 @@ kernel void antialias_keep(const FrameParams p, global const uint* restrict tile
   for (uint row = rows.first; row < rows.last; ++row) copy_row(row_of(p, rows, row), from, kept);
 }
 
-/// Colour that contours add to a sample. One step after the other: unrolled, all four colours would be in
-/// registers at once.
+/// Colour that contours add to a sample.
 static inline float4 added_to(const FrameParams p, const Steps steps, Sample s,
                               global const float4* restrict raster) {
-  float4 sum = 0.0f;
-  float total = 0.0f;
-#pragma unroll 1
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (!is_contour(at_step(p, steps, s, k))) continue;
-    const Parts parts = parts_taken(cut_at(p, steps, s, k), turn_of(k));
-    const Taken taken = taken_at(p, steps, s, k, raster);
-    sum += parts.x * taken.difference + parts.y * taken.changes;
-    total += parts.x;
-  }
-  return sum / fmax(total, 1.0f);
+  const Addition all = addition_of(p, steps, s, raster);
+  return all.sum / fmax(all.total, 1.0f);
 }
 
 /// Blends the samples. One work-item per DPR_ROWS of a tile. Deterministic.

@@ -183,26 +183,6 @@ static inline PartsByCut parts_by_cut(Cut cut, float turn) {
   return by;
 }
 
-/// What contours add to a sample, before all that it takes is brought to 1 at most.
-typedef struct {
-  float4 sum;
-  float total;
-} Addition;
-
-static inline Addition addition_of(const FrameParams p, const Steps steps, Sample s,
-                                   global const float4* raster) {
-  Addition a = {(float4)(0.0f), 0.0f};
-#pragma unroll 1
-  for (int k = 0; k < DPR_STEPS; ++k) {
-    if (!is_contour(at_step(p, steps, s, k))) continue;
-    const Parts parts = parts_taken(cut_at(p, steps, s, k), turn_of(k));
-    const Taken taken = taken_at(p, steps, s, k, raster);
-    a.sum += parts.x * taken.difference + parts.y * taken.changes;
-    a.total += parts.x;
-  }
-  return a;
-}
-
 /// Adds the tangents of what a sample takes at a step. That of a / total is (a' - a / total * total') / total.
 static inline void add_moved(const FrameParams p, const Steps steps, Sample s, int step, const Addition all,
                              uint directions, global const float4* raster, global const float2* cut_tangents,

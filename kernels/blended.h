@@ -19,4 +19,25 @@ static inline Taken taken_at(const FrameParams p, const Steps steps, Sample s, i
   return t;
 }
 
+/// Colour that contours add to a sample, and all that it takes of the others, before that is brought to 1 at most.
+typedef struct {
+  float4 sum;
+  float total;
+} Addition;
+
+/// One step after the other: unrolled, all four colours would be in registers at once.
+static inline Addition addition_of(const FrameParams p, const Steps steps, Sample s,
+                                   global const float4* raster) {
+  Addition a = {(float4)(0.0f), 0.0f};
+#pragma unroll 1
+  for (int k = 0; k < DPR_STEPS; ++k) {
+    if (!is_contour(at_step(p, steps, s, k))) continue;
+    const Parts parts = parts_taken(cut_at(p, steps, s, k), turn_of(k));
+    const Taken taken = taken_at(p, steps, s, k, raster);
+    a.sum += parts.x * taken.difference + parts.y * taken.changes;
+    a.total += parts.x;
+  }
+  return a;
+}
+
 #endif

@@ -90,19 +90,17 @@ kernel void blur_rows(const BlurPass p, global const uint2* restrict extents,
   for (int first = 0; first < place.steps; first += DPR_BLUR_ROW) {
     const int at = place.at + first, steps = place.steps - first;
     global float4* to = out + (place.out + (size_t)first);
-    if (steps >= DPR_BLUR_ROW && is_by_vector(p, at)) {
-      pixels_n vectors[DPR_BLUR_ROW_BLOCK];
-      row_sums_by_vector(p, at, weights, in + place.in, vectors);
+    pixels_n sums[DPR_BLUR_ROW_BLOCK];
+    row_sums(p, at, steps, weights, in + place.in, sums);
+    if (steps >= DPR_BLUR_ROW) {
 #pragma unroll
-      for (int k = 0; k < DPR_BLUR_ROW_BLOCK; ++k) store_pixels(vectors[k], to + k * DPR_BLUR_PIXELS);
+      for (int k = 0; k < DPR_BLUR_ROW_BLOCK; ++k) store_pixels(sums[k], to + k * DPR_BLUR_PIXELS);
       continue;
     }
-    float4 sums[DPR_BLUR_ROW];
-    row_sums(p, at, steps, weights, in + place.in, sums);
 #pragma unroll
     for (int k = 0; k < DPR_BLUR_ROW; ++k) {
       if (k >= steps) break;
-      to[k] = sums[k];
+      to[k] = ((const float4*)sums)[k];
     }
   }
 }

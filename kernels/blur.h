@@ -228,22 +228,15 @@ static inline void row_sums_by_vector(const BlurPass p, int at, global const flo
   sums[3] = sum3;
 }
 
-/// True if row_sums_by_vector() may find the sums of a block.
-static inline int is_by_vector(const BlurPass p, int at) {
-  const int last = at + p.offset;
-  return p.in_step == 1 && p.out_step == 1 && last >= p.taps - 1 && last + DPR_BLUR_ROW <= (int)p.in_length;
-}
-
 static inline void row_sums(const BlurPass p, int at, int steps, global const float* restrict weights,
-                            global const float4* restrict in, float4* sums) {
-  if (!is_by_vector(p, at)) {
-    row_sums_by_pixel(p, at, steps, weights, in, sums);
-    return;
+                            global const float4* restrict in, pixels_n sums[DPR_BLUR_ROW_BLOCK]) {
+  const int last = at + p.offset;
+  const int is_inside = last >= p.taps - 1 && last + DPR_BLUR_ROW <= (int)p.in_length;
+  if (p.in_step == 1 && p.out_step == 1 && is_inside) {
+    row_sums_by_vector(p, at, weights, in, sums);
+  } else {
+    row_sums_by_pixel(p, at, steps, weights, in, (float4*)sums);
   }
-  pixels_n vectors[DPR_BLUR_ROW_BLOCK];
-  row_sums_by_vector(p, at, weights, in, vectors);
-#pragma unroll
-  for (int k = 0; k < DPR_BLUR_ROW_BLOCK; ++k) store_lanes(vectors[k], sums + k * DPR_BLUR_PIXELS);
 }
 
 #endif

@@ -54,6 +54,16 @@ kernel void blur_columns_scale(const BlurPass p, const uint stride, const uint f
   *to = sum_of_channels(product);
 }
 
+/// The sums of a block of pixels of a row, its first the place's `k`-th, times their gradients.
+static inline float4 row_product(const BlurPass p, const BlurPlace place, int k,
+                                 global const float* restrict weights, global const float4* restrict in,
+                                 global const float4* restrict grad) {
+  const int steps = place.steps - k;
+  pixels_n sums[DPR_BLUR_ROW_BLOCK];
+  row_sums(p, place.at + k, steps, weights, in + place.in, sums);
+  return product_of_pixels((const float4*)sums, grad + (place.out + (size_t)k), steps, DPR_BLUR_ROW);
+}
+
 /// The same along rows, of which each image has `rows`: as blur_columns_scale, with the NDRange of blur_rows.
 /// It asks no extents: with them NVIDIA's registers would not hold the sums.
 kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint first, const uint rows,
@@ -62,12 +72,9 @@ kernel void blur_rows_scale(const BlurPass p, const uint stride, const uint firs
   const uint i = (uint)get_global_id(0), items = rows * row_items_per_line(p);
   if (i >= p.lines * row_items_per_line(p)) return;
   const BlurPlace place = row_place(p, i);
-  float4 product = 0.0f;
-  for (int k = 0; k < place.steps; k += DPR_BLUR_ROW) {
-    const int steps = place.steps - k;
-    float4 sums[DPR_BLUR_ROW];
-    row_sums(p, place.at + k, steps, weights, in + place.in, sums);
-    product += product_of_pixels(sums, grad + (place.out + (size_t)k), steps, DPR_BLUR_ROW);
-  }
+  // The first before the loop: a GPU has no other, and holds its sums in registers where there is no loop.
+  float4 product = row_product(p, place, 0, weights, in, grad);
+  for (int k = DPR_BLUR_ROW; k < DPR_BLUR_ROW_LENGTH && k < place.steps; k += DPR_BLUR_ROW)
+    product += row_product(p, place, k, weights, in, grad);
   products[i / items * stride + first + i % items] = sum_of_channels(product);
 }

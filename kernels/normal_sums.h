@@ -67,10 +67,6 @@ static inline Vec3n behind_object(float4 background, Vec3n target) {
   return background.w == 0.0f ? splat3(background) : target;
 }
 
-static inline realn channel_of(Vec3n v, uint channel) {
-  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
-}
-
 #define DPR_THRESHOLDS 16    /* a pass of the search for a median tells so many parts apart */
 #define DPR_MEASURED_KINDS 2 /* coverage and depth */
 

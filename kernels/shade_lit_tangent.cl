@@ -23,10 +23,6 @@ typedef struct {
 #define DPR_CHANNELS_AT_ONCE 3
 #endif
 
-static inline realn component3n(Vec3n v, int channel) {
-  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
-}
-
 /// A vector's component, 0 in the others.
 static inline Vec3n only3n(Vec3n v, int channel) {
   const realn none = 0.0f;
@@ -200,9 +196,9 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
           const uint out = color + (uint)(first + k) * plane;
           const int has_own = DPR_BASE == DPR_BASE_OF_CORNERS && q.colors != 0;
           const realn of_base =
-              has_own ? load_own_run(last + out, i + out, of) : component3n(base, first + k);
-          store_run(component3n(f.lit.factor, first + k) * of_base + component3n(of_light, first + k) +
-                        along_points(row[k], moved),
+              has_own ? load_own_run(last + out, i + out, of) : channel_of(base, (uint)(first + k));
+          store_run(channel_of(f.lit.factor, (uint)(first + k)) * of_base +
+                        channel_of(of_light, (uint)(first + k)) + along_points(row[k], moved),
                     i + out, last + out, of);
         }
       }

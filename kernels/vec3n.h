@@ -25,6 +25,9 @@ static inline realn dot3n(Vec3n a, Vec3n b) { return a.x * b.x + a.y * b.y + a.z
 static inline Vec3n sub3n(Vec3n a, Vec3n b) { return make_vec3n(a.x - b.x, a.y - b.y, a.z - b.z); }
 static inline Vec3n mul3n(Vec3n a, Vec3n b) { return make_vec3n(a.x * b.x, a.y * b.y, a.z * b.z); }
 static inline Vec3n scale3n(Vec3n a, realn s) { return make_vec3n(a.x * s, a.y * s, a.z * s); }
+static inline realn channel_of(Vec3n v, uint channel) {
+  return channel == 0 ? v.x : channel == 1 ? v.y : v.z;
+}
 /// a + b * s
 static inline Vec3n mad3n(Vec3n b, realn s, Vec3n a) {
   return make_vec3n(mad(b.x, s, a.x), mad(b.y, s, a.y), mad(b.z, s, a.z));

@@ -35,7 +35,7 @@ DPR_API double angle_degrees(const dmat3& a, const dmat3& b);
 /// Unknowns of the target's light.
 enum class PoseLight {
   fixed,     ///< nothing: it is the scene's
-  gain,      ///< a gain on the mesh's colours and an offset, by channel
+  gain,      ///< a gain on the mesh's colours, at least 0, and an offset, by channel
   harmonics  ///< distant light from everywhere: spherical harmonics to the second order, and an offset, by
              ///< channel
 };

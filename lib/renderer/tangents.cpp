@@ -178,7 +178,7 @@ std::size_t Renderer::Impl::tangent_bytes() const {
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height,
                     of_vertices = std::size_t{frame.views} * frame.vertices;
   const std::size_t clipped = frame.clips != 0 ? of_vertices + 4 * std::size_t{frame.views} * frame.faces : 0;
-  return sizeof(cl_float4) * (2 * of_vertices + clipped + (shade.lit() ? transform.world.size() : 0) + 0) +
+  return sizeof(cl_float4) * (2 * of_vertices + clipped + (shade.lit() ? transform.world.size() : 0)) +
          (pixel_noise ? samples * (2 * sizeof(cl_float4) + Antialias::k_tangent_bytes) : 0);
 }
 
