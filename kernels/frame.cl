@@ -9,6 +9,7 @@
 #include "clip.cl"
 #include "shade.cl"
 #include "normals.cl"
+#include "occupancy.cl"
 #include "gather.cl"
 #include "reduce.cl"
 #include "image_loss.cl"

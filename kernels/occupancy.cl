@@ -3,23 +3,13 @@
 
 #include "priors.h"
 
-#ifndef DPR_OCCUPANCY_WIDTH
-#define DPR_OCCUPANCY_WIDTH DPR_FIXED_WIDTH
-#endif
-
 /// Occupancy of a fragment: p, ln p, d ln p / ds, and x with d / dsigma = -x d / ds.
 typedef struct {
   realn p, log_p, slope, ratio;
 } Perturbed;
 
-#if DPR_OCCUPANCY_WIDTH != DPR_FIXED_WIDTH
-
-/// H(s), which at distance 0 says who owns the sample.
-static inline intn is_inside(realn distance) { return as_intn(distance) >= 0; }
-
-#endif
-
-#if DPR_OCCUPANCY_WIDTH == DPR_VARIABLE_WIDTH
+/// H(s), by the sign bit: at distance 0 the sign says who owns the sample.
+static inline intn is_positive(realn distance) { return as_intn(distance) >= 0; }
 
 /// Least distance of occupancies from 0 and 1, where the chain through ln p and the colour behind an opaque
 /// triangle would be lost.
@@ -28,8 +18,8 @@ static inline intn is_inside(realn distance) { return as_intn(distance) >= 0; }
 /// The rigid image's occupancy, with the slope of uniform noise whose width is the distance from the pixel to
 /// the edge, |s|: over that distance p changes by 1 (Kato, Ushiku & Harada, "Neural 3D Mesh Renderer", CVPR
 /// 2018, section 3.2). Sigma keeps the slope finite at the edge; the image does not depend on it.
-static inline Perturbed perturb(realn distance, float sigma) {
-  const intn inside = is_inside(distance);
+static inline Perturbed perturb_by_distance(realn distance, float sigma) {
+  const intn inside = is_positive(distance);
   Perturbed v;
   v.p = choose(inside, (realn)(1.0f - DPR_RIGID_MARGIN), (realn)(DPR_RIGID_MARGIN));
   v.log_p = choose(inside, (realn)(log1p(-DPR_RIGID_MARGIN)), (realn)(log(DPR_RIGID_MARGIN)));
@@ -38,12 +28,9 @@ static inline Perturbed perturb(realn distance, float sigma) {
   return v;
 }
 
-#elif DPR_OCCUPANCY_WIDTH == DPR_ZERO_WIDTH
-
 /// The rigid image's occupancy (1): no noise, no slope.
-static inline Perturbed perturb(realn distance, float sigma) {
-  (void)sigma;
-  const intn inside = is_inside(distance);
+static inline Perturbed unperturbed(realn distance) {
+  const intn inside = is_positive(distance);
   Perturbed v;
   v.p = choose(inside, (realn)(1.0f), (realn)(0.0f));
   v.log_p = choose(inside, (realn)(0.0f), (realn)(DPR_LOG_ZERO));
@@ -52,22 +39,20 @@ static inline Perturbed perturb(realn distance, float sigma) {
   return v;
 }
 
-#else
-
 /// |s / sigma| is clamped here: far outside what any prior resolves, and its square is still a number.
 #define DPR_MAX_RATIO 1e14f
 
-static inline Perturbed perturb(realn distance, float sigma) {
+static inline Perturbed perturb(realn distance, const OccupancyParams p) {
+  if (p.noise_width == DPR_ZERO_WIDTH) return unperturbed(distance);
+  if (p.noise_width == DPR_VARIABLE_WIDTH) return perturb_by_distance(distance, p.sigma);
   Perturbed v;
   realn hazard;
-  v.ratio = clamp(distance / sigma, -DPR_MAX_RATIO, DPR_MAX_RATIO);
+  v.ratio = clamp(distance / p.sigma, -DPR_MAX_RATIO, DPR_MAX_RATIO);
   occupancy_log(v.ratio, &v.log_p, &hazard);
   v.p = exp_n(lesser(v.log_p, 0.0f));
-  v.slope = hazard / sigma;
+  v.slope = hazard / p.sigma;
   return v;
 }
-
-#endif
 
 /// Any number of work-items, by vector of fragments. Deterministic.
 /// in   fragment_starts  uint[pair + 1]   up to `last_pair`: its last is the number of fragments
@@ -76,7 +61,7 @@ kernel void occupancy_forward(const OccupancyParams p, const uint last_pair,
                               global const uint* restrict fragment_starts, global float* restrict fragments) {
   const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
   for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
-    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p);
     store_n(greater(v.log_p, DPR_LOG_ZERO), i, fragments + DPR_PLANE(p, LOG_OCCUPANCY));
     store_n(v.p, i, fragments + DPR_PLANE(p, OCCUPANCY));
   }
@@ -99,7 +84,7 @@ kernel void occupancy_backward(const OccupancyParams p, const uint2 range, globa
     realn sum = 0.0f;
     for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
       const intn in_run = lanes_before(last, i);
-      const Perturbed v = perturb(load_run(in_run, i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+      const Perturbed v = perturb(load_run(in_run, i, fragments + DPR_PLANE(p, DISTANCE)), p);
       const realn grad = load_run(in_run, i, grads + DPR_GRAD_PLANE(p, LOG_OCCUPANCY)) * v.slope;
       store_run(grad, i, end, grads + DPR_GRAD_PLANE(p, DISTANCE));
       sum -= v.ratio * grad;
@@ -119,7 +104,7 @@ kernel void occupancy_tangent(const OccupancyParams p, const uint last_pair, con
                               global const FrameTangent* restrict frames, global float* restrict tangents) {
   const uint last = fragment_starts[last_pair], step = (uint)get_global_size(0) * DPR_WIDTH;
   for (uint i = (uint)get_global_id(0) * DPR_WIDTH; i < last; i += step) {
-    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p.sigma);
+    const Perturbed v = perturb(load_n(i, fragments + DPR_PLANE(p, DISTANCE)), p);
     for (uint d = 0; d < q.directions; ++d) {
       global float* const out =
           tangents + (size_t)d * q.planes * p.grad_fragments + DPR_GRAD_PLANE(p, LOG_OCCUPANCY);

@@ -150,6 +150,7 @@ typedef struct Sampling {
 /// The perturbation of distances.
 typedef struct OccupancyParams {
   float sigma;
+  uint noise_width; /* DPR_FIXED_WIDTH, DPR_VARIABLE_WIDTH or DPR_ZERO_WIDTH */
   Sampling sampling;
   uint width;                     /* pixels, to name a pixel's noise */
   uint faces;                     /* of one view */

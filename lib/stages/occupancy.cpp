@@ -2,7 +2,9 @@
 
 namespace dpr {
 
-std::string prior_option(Prior prior) { return " -DDPR_PRIOR=" + std::string(to_string(prior)); }
+std::string prior_option(Prior prior) {
+  return prior == Prior::gaussian ? "" : " -DDPR_PRIOR=" + std::string(to_string(prior));
+}
 
 bool samples_jointly(const Smoothing& smoothing) {
   return smoothing.composition == Composition::joint &&
@@ -25,8 +27,7 @@ shared::Sampling sampling_params(const Smoothing& smoothing) {
 
 Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
   if (samples_jointly(smoothing)) return {smoothing, now_.kernels};
-  const std::string options = prior_option(smoothing.occupancy_prior) + " -DDPR_OCCUPANCY_WIDTH=" +
-                              std::to_string(static_cast<int>(smoothing.occupancy_width));
+  const std::string options = prior_option(smoothing.occupancy_prior);
   return SmoothedStage::prepare(smoothing, std::string(to_string(smoothing.occupancy_estimator)) + options,
                                 [&](OccupancyKernels& kernels) {
                                   if (smoothing.occupancy_estimator == Estimator::exact) {
@@ -40,6 +41,7 @@ Occupancy::Setting Occupancy::prepare(const Smoothing& smoothing) const {
 shared::OccupancyParams Occupancy::params(const shared::FrameParams& p) const {
   shared::OccupancyParams o{};
   o.sigma = now_.smoothing.sigma;
+  o.noise_width = static_cast<cl_uint>(now_.smoothing.occupancy_width);
   o.sampling = sampling_params(now_.smoothing);
   o.width = p.width;
   o.faces = p.faces;

@@ -46,7 +46,7 @@ class Occupancy : public SmoothedStage<OccupancyKernels> {
   shared::OccupancyParams params(const shared::FrameParams& p) const;
 };
 
-/// The build option that chooses a prior.
+/// The build option that chooses a prior; none for that of kernels/frame.cl.
 std::string prior_option(Prior prior);
 
 /// True for the sampled joint composition.

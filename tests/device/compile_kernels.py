@@ -21,7 +21,6 @@ import sys
 
 LANES = [1, 8, 16]
 MOST_ARGUMENTS = 14
-WIDTHS = [f"-DDPR_OCCUPANCY_WIDTH={width}" for width in range(3)]
 # Unlit surfaces are shade.cl's. One kind of light a time, none, and all.
 SHADING = [[f"-DDPR_SHADING={shading}", f"-DDPR_LIGHTS={lights}", f"-DDPR_BASE={base}"]
            for shading, lights, base in itertools.product([1, 2, 3, 4], [0, 1, 2, 4, 7], ["DPR_BASE_OF_CORNERS", "DPR_BASE_OF_FRAGMENTS"])]
@@ -42,8 +41,8 @@ def option_sets(kernels):
     measured = [[*fit, "-DDPR_MEASURED=1"] for fit in fits]
     return {"aggregate.cl": [[prior] for prior in of_exact], "aggregate_joint.cl": [[prior] for prior in of_exact],
             "aggregate_sampled.cl": [[prior] for prior in of_sampled], "aggregate_joint_sampled.cl": joint,
-            "normal_equations.cl": fits + measured, "normal_measured.cl": measured, "occupancy.cl": [list(pair) for pair in itertools.product(of_exact, WIDTHS)],
-            "occupancy_sampled.cl": [list(pair) for pair in itertools.product(of_sampled, WIDTHS)], "shade_lit.cl": SHADING,
+            "normal_equations.cl": fits + measured, "normal_measured.cl": measured, "occupancy.cl": [[prior] for prior in of_exact],
+            "occupancy_sampled.cl": [[prior] for prior in of_sampled], "shade_lit.cl": SHADING,
             "shade_lit_tangent.cl": SHADING, "transform.cl": [[], ["-cl-fp32-correctly-rounded-divide-sqrt"]]}
 
 

@@ -137,6 +137,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(Sampling, seed_high),
           DPR_SIZE(OccupancyParams),
           DPR_FIELD(OccupancyParams, sigma),
+          DPR_FIELD(OccupancyParams, noise_width),
           DPR_FIELD(OccupancyParams, sampling),
           DPR_FIELD(OccupancyParams, width),
           DPR_FIELD(OccupancyParams, faces),
