@@ -128,7 +128,7 @@ void run(const CLI::App& command, const std::string& folder, const CommonOptions
   const FoundBody found{{}, result};
   write_json(std::filesystem::path(folder) / "pose.json", poses_to_json(scene, {&found, 1}, truth.rotation));
   write_pose_report(folder, page_source("A cube's pose, found from 50 degrees away", common, {&device, 1}),
-                    device, scene, {&found, 1}, target, {}, common.quiet, truth.rotation);
+                    device, scene, {&found, 1}, {target, LeastSquares()}, {}, common.quiet, truth.rotation);
   if (!common.quiet) {
     std::printf("%s: from %.1f to %.2f degrees from the truth in %u iterations, %.1f s\n", folder.c_str(),
                 angle_degrees(start.rotation, truth.rotation),

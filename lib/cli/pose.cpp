@@ -80,7 +80,7 @@ std::vector<FoundBody> solve(const CLI::App& command, PoseCommandOptions& option
   if (rotation && bodies.size() > 1)
     throw InvalidArgument(k_turn, "one beside several --mesh", "none, or one --mesh");
   const auto named = [&](const auto& work) {
-    return with_option_names(command, {{"iterations", "--level-iterations"}}, work);
+    return with_option_names(command, k_least_squares_names, work);
   };
   PoseOptions first = options.solver;
   first.meshes = bodies.front();
@@ -114,7 +114,9 @@ std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
     add("--focal", "finds an unknown focal length");
     add("--distortion", "finds a lens");
   }
-  add("--robust", "is for clutter and occlusion");
+  if (!options.least_squares.method.unknown_background) add("--robust", "is for clutter and occlusion");
+  if (!options.pictures.target.empty() && options.pictures.silhouette.empty())
+    add("--unknown-background", "is for photographs");
   if (options.least_squares.light == name_of(PoseLight::fixed))
     text += (text.empty() ? "" : "; ") + std::string("--light harmonics for another light");
   return text.empty() ? "" : ": " + text;
@@ -220,7 +222,7 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
   }
   choose_method(command, options);
   const SceneOfViews in = read_scene_of_views(options.scene, options.views, common);
-  with_option_names(command, {{"iterations", "--level-iterations"}}, [&] {
+  with_option_names(command, k_least_squares_names, [&] {
     find_poses_in_views({options.views, options.output, options.report, options.meshes, options.moving,
                          options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
                         in, common);
@@ -250,10 +252,10 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const std::vector<FoundBody> found =
       solve(command, options, rotation, device, scene, target, bodies, common.quiet);
   const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
+  const PoseTarget observed{target, options.least_squares.method};
   const bool is_table = writes_csv(options);
   FoundLight light;
-  if (!is_table || !options.report.empty())
-    light = light_of(device, scene, found, target, options.least_squares.method);
+  if (!is_table || !options.report.empty()) light = light_of(device, scene, found, observed);
   if (is_table) {
     write_bop_result(options.output, options.bop, found.front().result);
   } else {
@@ -264,8 +266,8 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   if (!options.report.empty()) {
     const std::string& source = bop ? options.bop.folder : options.scene;
     const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
-    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, found, target,
-                      light, common.quiet, true_rotation);
+    write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, found,
+                      observed, light, common.quiet, true_rotation);
   }
   if (common.quiet) return;
   print(command, options, found);

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "cli/option_names.hpp"
 #include "dpr/pose.hpp"
 
 namespace dpr::cli {
@@ -15,6 +16,9 @@ struct LeastSquaresOptions {
 };
 
 void add_least_squares_options(CLI::App& command, const char* group, LeastSquaresOptions& options);
+/// Their fields that have another name there.
+inline const OptionNames k_least_squares_names{{"iterations", "--level-iterations"},
+                                               {"robust_scale", "--robust"}};
 
 /// The method that the options describe, without the mask. Throws InvalidArgument.
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options);

@@ -107,14 +107,31 @@ std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera&
   return write_strip(file, images, captions);
 }
 
-/// Poses that explain the target equally well, as the end is rendered.
-std::vector<Picture> write_equals(const std::filesystem::path& file, PoseCamera& camera,
-                                  const PoseResult& result) {
+/// The scene with all bodies but one where they were found.
+Scene with_others(const Scene& scene, std::span<const FoundBody> found, const FoundBody* one = nullptr) {
+  Scene result = scene;
+  for (const FoundBody& body : found) {
+    if (&body != one) PoseBody(scene, body.meshes).place(result, body.result.pose);
+  }
+  return result;
+}
+
+/// Poses that explain the target equally well, as the end is rendered, each in the light that is found with it.
+std::vector<Picture> write_equals(const std::filesystem::path& file, const Device& device, const Scene& scene,
+                                  std::span<const FoundBody> found, std::size_t body,
+                                  const PoseTarget& target) {
+  const PoseResult& result = found[body].result;
   if (result.equals.size() < 2) return {};
+  std::vector<FoundBody> instead(found.begin(), found.end());
   std::vector<Image> images;
   std::vector<std::string> captions;
   for (const PoseHypothesis& other : result.equals) {
     if (images.size() == k_most_equals) break;
+    instead[body].result.pose = other.pose;
+    instead[body].result.focal_scale = other.focal_scale;
+    instead[body].result.radial = other.radial;
+    const FoundLight light = light_of(device, scene, instead, target);
+    PoseCamera camera(device, with_others(scene, found, &found[body]), found[body], light);
     images.push_back(camera.render(other, rigid_smoothing()));
     captions.push_back(format("%.2f degrees from the result, loss %.4g",
                               angle_degrees(other.pose.rotation, result.pose.rotation), other.loss));
@@ -156,15 +173,6 @@ Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3
              {"hypotheses", step.hypotheses}};
   if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
   return entry;
-}
-
-/// The scene with all bodies but one where they were found.
-Scene with_others(const Scene& scene, std::span<const FoundBody> found, const FoundBody* one = nullptr) {
-  Scene result = scene;
-  for (const FoundBody& body : found) {
-    if (&body != one) PoseBody(scene, body.meshes).place(result, body.result.pose);
-  }
-  return result;
 }
 
 }  // namespace
@@ -321,8 +329,8 @@ Json poses_to_json(const Scene& scene, std::span<const FoundBody> found,
   return json;
 }
 
-FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found, const Image& target,
-                    const LeastSquares& method) {
+FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found,
+                    const PoseTarget& target) {
   const PoseResult& result = found.front().result;
   const PoseLight light = light_of_all(found);
   if (light == PoseLight::fixed) return {};
@@ -332,7 +340,9 @@ FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody
   scene.smoothing = Smoothing();
   scene.smoothing.sigma = blur * blur;
   scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
-  const ShapeView view{.image = target, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
+  const ShapeView view{
+      .image = target.image, .camera = scene.camera, .has_alpha = false, .mask = target.method.mask};
+  const LeastSquares& method = target.method;
   const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
   const float scale = method.robust ? open_scale : 0;
   if (light == PoseLight::gain) return {find_gain(device, scene, view, scale), {}};
@@ -348,11 +358,11 @@ void add_light(Json& json, const FoundLight& light) {
 }
 
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, std::span<const FoundBody> found, const Image& target,
+                       const Scene& scene, std::span<const FoundBody> found, const PoseTarget& target,
                        const FoundLight& light, bool quiet, const std::optional<glm::dmat3>& truth) {
   make_folder(folder);
   PosePictures pictures;
-  pictures.target = write_picture(folder / "target.png", target, "target");
+  pictures.target = write_picture(folder / "target.png", target.image, "target");
   Image end;  // the same for every body
   unsigned iterations = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -363,7 +373,7 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
     iterations += result.iterations;
     BodyPictures& body = pictures.bodies.emplace_back();
     body.frames = write_frames(folder / ("iterations" + number + ".png"), camera, result, truth);
-    body.equals = write_equals(folder / ("equals" + number + ".png"), camera, result);
+    body.equals = write_equals(folder / ("equals" + number + ".png"), device, scene, found, i, target);
     body.plot = "plot" + number + ".png";
     body.curves = pose_plot(result.history, result.start.rotation, truth);
     if (!plot(folder / body.plot, body.curves)) {
@@ -377,10 +387,10 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
   pictures.end =
       write_picture(folder / "end.png", end,
                     format("end, after %u iterations", iterations) + angle_text(first.pose, truth));
-  const Differences difference = differences({end}, {target});
+  const Differences difference = differences({end}, {target.image});
   pictures.difference = write_picture(folder / "difference.png", difference.images.front(),
                                       difference.caption() + ": end and target");
-  pictures.model = found_model(with_others(scene, found), found.front(), target);
+  pictures.model = found_model(with_others(scene, found), found.front(), target.image);
   write_pose_page(folder / "index.html", source, found, pictures, truth);
 }
 

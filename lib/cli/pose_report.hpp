@@ -49,18 +49,23 @@ struct FoundLight {
   std::optional<ColorGain> gain;
   std::optional<Lights> lights;
 };
+/// A picture, and how the solver compared poses with it.
+struct PoseTarget {
+  const Image& image;
+  const LeastSquares& method;
+};
 /// One for all bodies.
-FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found, const Image& target,
-                    const LeastSquares& method);
+FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody> found,
+                    const PoseTarget& target);
 /// Adds it to pose.json.
 void add_light(Json& json, const FoundLight& light);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
-/// them, all in that light. Several bodies have iterations_0.png, plot_0.png and so on, which show a body's way with
+/// them, all in that light; poses that are equals, each in its own. Several bodies have iterations_0.png, plot_0.png and so on, which show a body's way with
 /// the others where they were found. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
-                       const Scene& scene, std::span<const FoundBody> found, const Image& target,
+                       const Scene& scene, std::span<const FoundBody> found, const PoseTarget& target,
                        const FoundLight& light, bool quiet, const std::optional<glm::dmat3>& truth = {});
 
 }  // namespace dpr::cli

@@ -36,9 +36,10 @@ std::vector<PoseView> pose_views(ShapeViews views, const std::string& file) {
 /// What was found in the pictures.
 struct FoundViews {
   bool moving;
-  std::vector<Scene> scenes;       // [view] with its camera
-  std::vector<FoundBody> found;    // [view]
-  std::vector<FoundLight> lights;  // [view]
+  std::vector<Scene> scenes;          // [view] with its camera
+  std::vector<FoundBody> found;       // [view]
+  std::vector<FoundLight> lights;     // [view]
+  std::vector<LeastSquares> methods;  // [view] with its mask
 };
 
 /// Of a moving object a pose for each view; otherwise that of a single picture, and each view's camera and light.
@@ -148,14 +149,14 @@ void find_poses_in_views(const PoseViewsOptions& options, const SceneOfViews& in
   solver.meshes = bodies.front();
   const Device device = open_device(common);
   std::vector<PoseResult> results = solve(options, solver, device, scene, views, common.quiet);
-  FoundViews found{options.moving, {}, {}, {}};
+  FoundViews found{options.moving, {}, {}, {}, {}};
   for (std::size_t i = 0; i < views.size(); ++i) {
     Scene& own = found.scenes.emplace_back(scene);
     own.camera = views[i].camera;
     found.found.push_back({solver.meshes, std::move(results[i])});
-    LeastSquares method = std::get<LeastSquares>(solver.method);
+    LeastSquares& method = found.methods.emplace_back(std::get<LeastSquares>(solver.method));
     method.mask = views[i].mask;
-    found.lights.push_back(light_of(device, own, {&found.found.back(), 1}, views[i].target, method));
+    found.lights.push_back(light_of(device, own, {&found.found.back(), 1}, {views[i].target, method}));
   }
   write_json(options.output, views_to_json(found));
   for (std::size_t i = 0; !options.report.empty() && i < views.size(); ++i) {
@@ -163,7 +164,7 @@ void find_poses_in_views(const PoseViewsOptions& options, const SceneOfViews& in
         format("The pose in view %zu of ", i) + std::filesystem::path(options.views).filename().string();
     write_pose_report(std::filesystem::path(options.report) / std::to_string(i),
                       page_source(title, common, {&device, 1}), device, found.scenes[i], {&found.found[i], 1},
-                      views[i].target, found.lights[i], common.quiet);
+                      {views[i].target, found.methods[i]}, found.lights[i], common.quiet);
   }
   if (common.quiet) return;
   if (options.moving) {

@@ -118,7 +118,7 @@ void run(const CLI::App& command, TrackCommandOptions& options, const CommonOpti
   }
   Sequence sequence(options.sequence, common.encoding(), scene);
   const Device device = open_device(common);
-  PoseTracker tracker = with_option_names(command, {{"iterations", "--level-iterations"}},
+  PoseTracker tracker = with_option_names(command, k_least_squares_names,
                                           [&] { return PoseTracker(device, scene, options.tracker); });
   Run track(options, common, device, scene);
   try {

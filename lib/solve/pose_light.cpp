@@ -37,15 +37,18 @@ ChannelLight solve_light(const LightSums& sums) {
     result.inverse = normal.llt().solve(Eigen::MatrixXd::Identity(last + 1, last + 1));
     result.light = result.inverse * right;
   };
-  solve();
-  if (result.light[0] < 0) {  // it would make a negative of the colours: there is none of it
-    normal.row(0).setZero();
-    normal.col(0).setZero();
-    normal(0, 0) = 1;
-    right[0] = 0;
+  const auto solve_without = [&](Eigen::Index first) {  // the terms before it
+    normal.topRows(first).setZero();
+    normal.leftCols(first).setZero();
+    normal.diagonal().head(first).setOnes();
+    right.head(first).setZero();
     solve();
-    result.inverse(0, 0) = 0;
-  }
+    result.inverse.diagonal().head(first).setZero();
+  };
+  solve();
+  // Less than no light would make a negative of the colours, everywhere or where the object is seen: there is none.
+  if (result.light[0] < 0) solve_without(1);
+  if (sums.sum.head(last).dot(result.light.head(last)) < 0) solve_without(last);
   if (sums.sum.dot(result.light) < 0) result.light.setZero();  // light takes nothing away
   result.prior_loss = result.light.cwiseAbs2().dot(prior);
   result.seen = whole;

@@ -80,9 +80,9 @@ void validate(const LeastSquares& options, const Scene& scene) {
   validate_factor(options.depth.weight, "depth_weight (pose)");
   if (options.box) validate_box(*options.box, scene);
   if (options.unknown_background && !options.robust)
-    throw InvalidArgument("unknown background (pose)", "a loss that is not robust", "a robust one");
+    throw InvalidArgument("unknown_background (pose)", "a loss that is not robust", "a robust one");
   if (options.unknown_background && !is_empty(options.silhouette.image)) {
-    throw InvalidArgument("unknown background (pose)", "a silhouette, which tells the background apart",
+    throw InvalidArgument("unknown_background (pose)", "a silhouette, which tells the background apart",
                           "one of the two");
   }
 }

@@ -224,12 +224,15 @@ class Reference {
     prior[last] += part * normal(last, last);
     normal.diagonal() += prior;
     const Vector right = t.transpose() * weights_.asDiagonal() * wanted;
-    inverses_[c] = normal.inverse();
-    if ((inverses_[c] * right)[0] < 0) {  // without the first term
-      inverses_[c].setZero();
-      inverses_[c].bottomRightCorner(last, last) = normal.bottomRightCorner(last, last).inverse();
-    }
-    lights_[c] = inverses_[c] * right;
+    const auto solve_from = [&](Eigen::Index first) {
+      const Eigen::Index count = last + 1 - first;
+      inverses_[c].setZero(last + 1, last + 1);
+      inverses_[c].bottomRightCorner(count, count) = normal.bottomRightCorner(count, count).inverse();
+      lights_[c] = inverses_[c] * right;
+    };
+    solve_from(0);
+    if (lights_[c][0] < 0) solve_from(1);
+    if ((weights_.asDiagonal() * t.leftCols(last) * lights_[c].head(last)).sum() < 0) solve_from(last);
     if ((weights_.asDiagonal() * t * lights_[c]).sum() < 0) lights_[c].setZero();
     prior_loss_ += lights_[c].cwiseAbs2().dot(prior);
   }
@@ -322,9 +325,13 @@ TEST_SUITE("unit") {
         const float negative = 1 - c.target.colors[i % c.pixels].s[0];
         c.colors[i] = {{negative, negative, negative, 1}};
       }
-      Run run(c, test::test_device());
-      const std::vector<double> negative = run.sums.losses(run.images, {});
-      CHECK(negative[0] > 0.1);  // variance of 0.1 and 0.9: 0.16
+      for (const bool is_flat :
+           {false, true}) {  // a single normal: directional light alone could be the negative
+        CAPTURE(is_flat);
+        if (is_flat) std::ranges::fill(c.normals, cl_float4{{0.2F, 0.1F, 0.97F, 1}});
+        Run run(c, test::test_device());
+        CHECK(run.sums.losses(run.images, {})[0] > 0.1);  // variance of 0.1 and 0.9: 0.16
+      }
       for (std::size_t i = 0; i < c.pixels; ++i) c.target.colors[i] = c.colors[i];
       Run same(c, test::test_device());
       CHECK(same.sums.losses(same.images, {})[0] < 0.01);

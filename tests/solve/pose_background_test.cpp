@@ -193,7 +193,7 @@ TEST_SUITE("robustness") {
     dpr::LeastSquares method = before_anything(dpr::PoseLight::fixed);
     method.robust = false;
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, solver(target, method),
-                          "unknown background (pose): got a loss that is not robust");
+                          "unknown_background (pose): got a loss that is not robust");
     method.robust = true;
     method.silhouette.image = dpr::Image(scene.width, scene.height, glm::vec4(1));
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, solver(target, method), "a silhouette, which tells");
