@@ -1,4 +1,4 @@
-// Faces that cross the near plane. What is left of such a face is a triangle or a quadrilateral: one face
+// Faces that cross the near plane, or the far plane alone. What is left of such a face is a triangle or a quadrilateral: one face
 // still, with one distance, to its outline, and the barycentrics of the whole face, so that what comes after
 // rasterization knows nothing of it. A quadrilateral is two triangles for coverage and barycentrics; by the
 // rule of ownership the diagonal between them is no seam.
@@ -10,12 +10,12 @@
 
 /// A cut between a corner that is kept and one that is not. The same for all faces that share the two. Not
 /// contracted, so that it is so in every lane.
-static inline float4 make_cut(const FrameParams p, global const ViewParams* view, float3 kept, float3 lost) {
+static inline float4 make_cut(const FrameParams p, global const ViewParams* view, float3 kept, float3 lost,
+                              float plane) {
 #pragma OPENCL FP_CONTRACT OFF
-  const float znear = view->znear;
-  const float part = (kept.z - znear) / (kept.z - lost.z);
-  const float2 at = bend_ndc(view, cut_ndc(p, kept, lost, part, znear));
-  return (float4)(at.x, at.y, znear, part);
+  const float part = (kept.z - plane) / (kept.z - lost.z);
+  const float2 at = bend_ndc(view, cut_ndc(p, kept, lost, part, plane));
+  return (float4)(at.x, at.y, plane, part);
 }
 
 /// The orientation of the larger of its two triangles; 0 where there is no area, or it reaches beyond
@@ -44,8 +44,8 @@ static inline Triangle triangle_of(const Outline o, int second, float orientatio
   return t;
 }
 
-/// Finds the faces that cross the near plane, and sets up what is left of them. All tiles of the bounds are
-/// listed. One work-item per (view, face). Deterministic.
+/// Finds the faces that cross a plane, the near one or else the far one, and sets up what is left of them. All tiles of
+/// the bounds are listed. One work-item per (view, face). Deterministic.
 /// in      views     ViewParams[view]
 /// in      faces     uint4[face]            vertex indices
 /// in      world     float4[view][vertex]
@@ -66,12 +66,17 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   const uint vertex[3] = {face->x, face->y, face->z};
   global const float4 *const view_ndc = ndc + view * p.vertices, *const view_world =
                                                                      world + view * p.vertices;
-  const float znear = views[view].znear;
+  const float znear = views[view].znear, zfar = views[view].zfar;
   const float4 projection = views[view].projection;
   clipped[i].corners = 0;
-  uint lost = 0;
+  uint nearer = 0, further = 0;
 #pragma unroll
-  for (uint k = 0; k < 3; ++k) lost |= view_ndc[vertex[k]].z < znear ? 1u << k : 0u;
+  for (uint k = 0; k < 3; ++k) {
+    nearer |= view_ndc[vertex[k]].z < znear ? 1u << k : 0u;
+    further |= view_ndc[vertex[k]].z > zfar ? 1u << k : 0u;
+  }
+  const uint lost = nearer != 0 ? nearer : further;
+  const float plane = nearer != 0 ? znear : zfar;
   if (lost == 0 || lost == 7) return;
   ClippedFace c;
   const uint one = popcount(lost) == 1 ? lost : 7 - lost;  // the corner that is alone on its side
@@ -90,7 +95,7 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
 #pragma unroll
   for (uint cut = 0; cut < 2; ++cut)
     c.cut[cut] = make_cut(p, views + view, clipped_corner(c, kept_corner(c, cut)).xyz,
-                          clipped_corner(c, lost_corner(c, cut)).xyz);
+                          clipped_corner(c, lost_corner(c, cut)).xyz, plane);
   const Outline o =
       outline_of(c, view_ndc[corner_in(face, c.first)].xyz, view_ndc[corner_in(face, (c.first + 1) % 3)].xyz);
   const int orientation = orientation_of_outline(o);

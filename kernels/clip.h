@@ -1,6 +1,6 @@
-// Faces that cross the near plane, and gradients by way of the cuts that they get there. A cut divides the
-// way between two corners in homogeneous coordinates, NDC times depth, where that way is straight: part =
-// (z_kept - znear) / (z_kept - z_lost). Orthographic, NDC are such coordinates themselves. A lens distorts
+// Faces that cross the near plane or the far one, and gradients by way of the cuts that they get there. A cut divides
+// the way between two corners in homogeneous coordinates, NDC times depth, where that way is straight: part =
+// (z_kept - z) / (z_kept - z_lost), z being the plane's depth. Orthographic, NDC are such coordinates themselves. A lens distorts
 // what is left: the cuts, not the way to what is behind the camera.
 #ifndef DPR_CLIP_H
 #define DPR_CLIP_H
@@ -42,13 +42,13 @@ static inline float4 clipped_corner(const ClippedFace c, uint k) {
 }
 static inline float4 clipped_cut(const ClippedFace c, uint cut) { return cut == 0 ? c.cut[0] : c.cut[1]; }
 
-/// By what homogeneous coordinates on the near plane are divided.
-static inline float cut_divisor(const FrameParams p, float znear) { return p.orthographic ? 1.0f : znear; }
+/// By what homogeneous coordinates on the plane are divided.
+static inline float cut_divisor(const FrameParams p, float plane) { return p.orthographic ? 1.0f : plane; }
 
 /// A cut's NDC, but for the lens.
-static inline float2 cut_ndc(const FrameParams p, float3 kept, float3 lost, float part, float znear) {
+static inline float2 cut_ndc(const FrameParams p, float3 kept, float3 lost, float part, float plane) {
 #pragma OPENCL FP_CONTRACT OFF
-  return (kept.xy + part * (lost.xy - kept.xy)) / cut_divisor(p, znear);
+  return (kept.xy + part * (lost.xy - kept.xy)) / cut_divisor(p, plane);
 }
 
 /// Passes a cut's gradient, of x and y in NDC and of the part, to those of its corners' homogeneous
@@ -58,9 +58,9 @@ static inline float3 cut_gradient(const FrameParams p, global const ViewParams* 
                                   uint cut, float2 grad, float grad_part) {
   const float3 kept = clipped_corner(c, kept_corner(c, cut)).xyz;
   const float3 lost = clipped_corner(c, lost_corner(c, cut)).xyz;
-  const float znear = clipped_cut(c, cut).z, part = clipped_cut(c, cut).w;
-  if (view->distorts) grad = bend_ndc_backward(view, cut_ndc(p, kept, lost, part, znear), grad);
-  const float2 g = grad / cut_divisor(p, znear);
+  const float plane = clipped_cut(c, cut).z, part = clipped_cut(c, cut).w;
+  if (view->distorts) grad = bend_ndc_backward(view, cut_ndc(p, kept, lost, part, plane), grad);
+  const float2 g = grad / cut_divisor(p, plane);
   return (float3)(g, (grad_part + dot(g, lost.xy - kept.xy)) / (kept.z - lost.z));
 }
 

@@ -3,17 +3,17 @@
 #include "setup.h"
 
 /// +1 where a triangle's corners wind counter-clockwise, -1 where clockwise; 0 where it reaches nearer than
-/// znear or has exactly no area. Written so that a NaN fails.
-static inline int orientation_of(float3 a, float3 b, float3 c, float znear) {
-  const int in_view = a.z >= znear && b.z >= znear && c.z >= znear;
+/// znear or further than zfar, or has exactly no area. Written so that a NaN fails.
+static inline int orientation_of(float3 a, float3 b, float3 c, float znear, float zfar) {
+  const int in_view =
+      a.z >= znear && b.z >= znear && c.z >= znear && a.z <= zfar && b.z <= zfar && c.z <= zfar;
   return in_view && fabs(a.x + a.y + b.x + b.y + c.x + c.y) < INFINITY ? side_of_line(a.xy, b.xy, c.xy) : 0;
 }
 
-/// False for what lies wholly beyond zfar, infinitely far, or reaches beyond DPR_MAX_NDC.
-static inline int is_in_range(float3 a, float3 b, float3 c, float zfar) {
+/// False for what reaches beyond DPR_MAX_NDC.
+static inline int is_in_range(float3 a, float3 b, float3 c) {
   const float2 reach = fmax(fmax(fabs(a.xy), fabs(b.xy)), fabs(c.xy));
-  return fmax(reach.x, reach.y) < DPR_MAX_NDC && fmin(fmin(a.z, b.z), c.z) < zfar &&
-         fmax(fmax(a.z, b.z), c.z) < INFINITY;
+  return fmax(reach.x, reach.y) < DPR_MAX_NDC;
 }
 
 /// Vertices of a face of a view.
@@ -37,12 +37,12 @@ static inline int set_up(const FrameParams p, uint i, const Corners corners,
                          global uchar* restrict facing, Triangle* t) {
   const float3 a = corners.a, b = corners.b, c = corners.c;
   const uint view = corners.view;
-  int orientation = orientation_of(a, b, c, views[view].znear);
+  int orientation = orientation_of(a, b, c, views[view].znear, views[view].zfar);
   if ((float)orientation == p.culled) orientation = 0;
   facing[i] = facing_of(orientation);
   const PixelBounds bounds = bounds_of(p, fmin(fmin(a.xy, b.xy), c.xy), fmax(fmax(a.xy, b.xy), c.xy));
   const int is_kept = orientation != 0 && (float)orientation != hidden[view * p.meshes + corners.mesh] &&
-                      is_in_range(a, b, c, views[view].zfar) && meets_image(p, bounds);
+                      is_in_range(a, b, c) && meets_image(p, bounds);
   if (!is_kept) return 0;
   const uint2 columns = samples_within(bounds.left, bounds.right, p.width);
   const uint2 rows = samples_within(bounds.top, bounds.bottom, p.height);

@@ -1,4 +1,4 @@
-/// Reference for faces that cross the near plane: what is left of them, their fragments and the gradients of
+/// Reference for faces that cross the near plane, or else the far plane: what is left of them, their fragments and the gradients of
 /// these.
 ///
 /// Corners are homogeneous: NDC times depth, and depth. So the way between two of them is straight, whichever
@@ -22,15 +22,33 @@ struct OutlineCorner {
 };
 using Outline = std::vector<OutlineCorner>;
 
-inline bool crosses_near_plane(const HomogeneousFace& face, double znear) {
-  const auto is_kept = [&](const Vec3d& h) { return h.z >= znear; };
+/// A plane of constant depth, and the side of it that is kept.
+struct ClipPlane {
+  double depth;
+  bool is_near;
+
+  bool keeps(const Vec3d& h) const { return is_near ? h.z >= depth : h.z <= depth; }
+};
+
+/// The plane that cuts a face: the near one where corners are nearer, or else the far one.
+inline ClipPlane plane_of(const HomogeneousFace& face, const RasterizeParameters& p) {
+  const ClipPlane near{p.znear, true};
+  const bool is_near = std::any_of(face.begin(), face.end(), [&](const Vec3d& h) { return !near.keeps(h); });
+  return is_near ? near : ClipPlane{p.zfar, false};
+}
+
+inline bool crosses_plane(const HomogeneousFace& face, const RasterizeParameters& p) {
+  const ClipPlane plane = plane_of(face, p);
+  const auto is_kept = [&](const Vec3d& h) { return plane.keeps(h); };
   return !std::all_of(face.begin(), face.end(), is_kept) && std::any_of(face.begin(), face.end(), is_kept);
 }
 
-/// The corners beyond the plane and on it (Sutherland and Hodgman), from the first kept one behind a lost one
-/// on.
-inline Outline clip_face(const HomogeneousFace& face, const Projection& projection, double znear) {
-  const auto is_kept = [&](std::size_t i) { return face[i % 3].z >= znear; };
+/// The corners on the side that is kept, and on the plane (Sutherland and Hodgman), from the first kept one behind a
+/// lost one on.
+inline Outline clip_face(const HomogeneousFace& face, const Projection& projection,
+                         const RasterizeParameters& p) {
+  const ClipPlane plane = plane_of(face, p);
+  const auto is_kept = [&](std::size_t i) { return plane.keeps(face[i % 3]); };
   const auto corner = [](std::size_t i) {
     Vec3d weights;
     weights[i % 3] = 1.0;
@@ -43,7 +61,7 @@ inline Outline clip_face(const HomogeneousFace& face, const Projection& projecti
     const Vec3d &a = face[i % 3], &b = face[(i + 1) % 3];
     if (is_kept(i)) outline.push_back({project(a, projection), corner(i)});
     if (is_kept(i) == is_kept(i + 1)) continue;
-    const double t = (a.z - znear) / (a.z - b.z);
+    const double t = (a.z - plane.depth) / (a.z - b.z);
     outline.push_back({project(a + t * (b - a), projection), (1.0 - t) * corner(i) + t * corner(i + 1)});
   }
   return outline;
@@ -85,7 +103,7 @@ inline double squared_distance(const Outline& outline, const Vec2d& point) {
 inline std::optional<Fragment> clipped_forward(const HomogeneousFace& h, const Projection& projection,
                                                std::size_t face, const Vec2d& point,
                                                const RasterizeParameters& p) {
-  const Outline outline = clip_face(h, projection, p.znear);
+  const Outline outline = clip_face(h, projection, p);
   const auto triangles = triangles_of(outline);
   bool inside = false;
   for (const auto& corners : triangles) inside = inside || is_inside(triangle_of(outline, corners), point);

@@ -47,11 +47,12 @@ inline double double_area(const NdcTriangle& t) {
   return cross(screen(t[1]) - screen(t[0]), screen(t[2]) - screen(t[0]));
 }
 
-/// Whole triangles are discarded: without area, any vertex before znear (see clip.hpp for those that are not
-/// before it), or all behind zfar. Written so that NaN is discarded.
+/// Whole triangles are discarded: without area, any vertex before znear or behind zfar (see clip.hpp for
+/// what is left where others are not). Written so that NaN is discarded.
 inline bool is_discarded(const NdcTriangle& t, const RasterizeParameters& p) {
   const double nearest = std::min({t[0].z, t[1].z, t[2].z});
-  if (!(nearest >= p.znear) || nearest > p.zfar) return true;
+  const double furthest = std::max({t[0].z, t[1].z, t[2].z});
+  if (!(nearest >= p.znear && furthest <= p.zfar)) return true;
   return !(std::fabs(double_area(t)) > 0.0);
 }
 

@@ -76,7 +76,7 @@ inline HomogeneousFace homogeneous_face(const PreparedScene& prepared, std::size
 }
 
 inline bool is_clipped(const PreparedScene& prepared, std::size_t face) {
-  return crosses_near_plane(homogeneous_face(prepared, face), prepared.rasterize.znear);
+  return crosses_plane(homogeneous_face(prepared, face), prepared.rasterize);
 }
 
 /// The corners of what is seen of a face, NDC and depth; none where it is discarded.
@@ -84,7 +84,7 @@ inline std::vector<Vec3d> visible_corners(const PreparedScene& prepared, std::si
   std::vector<Vec3d> corners;
   if (is_clipped(prepared, face)) {
     const Outline outline =
-        clip_face(homogeneous_face(prepared, face), prepared.projection, prepared.rasterize.znear);
+        clip_face(homogeneous_face(prepared, face), prepared.projection, prepared.rasterize);
     if (!(std::fabs(double_area(outline)) > 0.0)) return {};
     for (const OutlineCorner& corner : outline) corners.push_back(corner.ndc);
     return corners;

@@ -30,9 +30,18 @@ DepthRange depth_range(const BoxCorners& box, const Camera& camera, const glm::m
   return range;
 }
 
+namespace {
+
+constexpr double k_rounding = 1e-5;  // of the depth
+
+}  // namespace
+
 bool is_beyond_near_plane(const DepthRange& range, const Camera& camera) {
-  constexpr double k_rounding = 1e-5;  // of the depth
   return range.nearest > static_cast<double>(camera.znear) + k_rounding * range.furthest;
+}
+
+bool is_before_far_plane(const DepthRange& range, const Camera& camera) {
+  return range.furthest < (1 - k_rounding) * static_cast<double>(camera.zfar);
 }
 
 }  // namespace dpr

@@ -22,7 +22,8 @@ struct DepthRange {
 };
 DepthRange depth_range(const BoxCorners& box, const Camera& camera, const glm::mat4& model);
 
-/// True if no rounding of single precision takes anything of the box to the near plane.
+/// True if no rounding of single precision takes anything of the box to the near plane; or to the far plane.
 bool is_beyond_near_plane(const DepthRange& range, const Camera& camera);
+bool is_before_far_plane(const DepthRange& range, const Camera& camera);
 
 }  // namespace dpr

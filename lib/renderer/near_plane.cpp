@@ -27,7 +27,8 @@ bool NearPlane::may_be_crossed(const Scene& scene, std::span<const View> views) 
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (std::size_t m = 0; m < boxes_.size(); ++m) {
       const DepthRange range = depth_range(box_of(scene, v, m), views[v].camera, views[v].transforms[m]);
-      if (!is_beyond_near_plane(range, views[v].camera)) return true;
+      if (!is_beyond_near_plane(range, views[v].camera) || !is_before_far_plane(range, views[v].camera))
+        return true;
     }
   }
   return false;

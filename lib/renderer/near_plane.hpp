@@ -1,4 +1,4 @@
-// Test of whether a frame may have faces that cross the near plane; others are spared the clipping.
+// Test of whether a frame may have faces that cross the near plane or the far one; others are spared the clipping.
 #pragma once
 
 #include <optional>
@@ -37,7 +37,7 @@ class NearPlane {
     are_views_known_ = true;
   }
 
-  /// False only if every vertex is known to lie beyond the near plane. O(vertices of meshes moved + views *
+  /// False only if every vertex is known to lie between the planes. O(vertices of meshes moved + views *
   /// meshes).
   bool may_be_crossed(const Scene& scene, std::span<const View> views);
   /// The box around a mesh of a view. O(vertices) where it has not been measured.

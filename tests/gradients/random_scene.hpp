@@ -126,9 +126,11 @@ inline void draw_camera(Draw& draw, Trial& trial) {
   // With noise of triangles images jump at the horizon of a face's plane (kernels/README.md).
   trial.scene.perspective_correct = draw.chance(trial.has("noise of triangles") ? 0.25F : 0.8F);
   if (!trial.scene.perspective_correct) trial.features.insert("affine");
-  if (kind == 4) camera.znear = 5.0F;  // through the middle
-  constexpr const char* k_names[] = {"pinhole", "orthographic", "intrinsics", "lens", "near plane"};
-  trial.features.insert(k_names[kind]);
+  const bool is_far = trial.scene.width % 2 == 0;
+  if (kind == 4) (is_far ? camera.zfar : camera.znear) = 5.0F;  // through the middle
+  const char* const names[] = {"pinhole", "orthographic", "intrinsics", "lens",
+                               is_far ? "far plane" : "near plane"};
+  trial.features.insert(names[kind]);
 }
 
 inline void draw_smoothing(Draw& draw, Trial& trial) {

@@ -41,7 +41,7 @@ Scene whole_cube() { return scene_of(welded_cube(), reduced(k_width, 8), reduced
 Scene cut_cube() { return scene_cut_open(welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
 /// A triangle in the camera's space, whose near plane is at 1.
-Scene cut_triangle(const std::vector<glm::vec3>& corners) {
+Scene cut_triangle(const std::vector<glm::vec3>& corners, float zfar = 20.0F) {
   Mesh mesh;
   mesh.positions = corners;
   mesh.faces = {{0, 1, 2}};
@@ -49,13 +49,16 @@ Scene cut_triangle(const std::vector<glm::vec3>& corners) {
   Scene scene = scene_of(mesh, reduced(k_width, 8), reduced(k_height, 6));
   scene.meshes[0].transform = glm::mat4(1.0F);
   scene.camera.view = glm::mat4(1.0F);
+  scene.camera.zfar = zfar;
   return scene;
 }
 
-/// Triangles of which the near plane leaves a quadrilateral, and a triangle.
+/// Triangles of which the near plane leaves a quadrilateral, and a triangle; and the far plane.
 std::vector<Scene> cut_triangles() {
   return {cut_triangle({{-0.8F, -0.5F, -3.0F}, {0.9F, -0.6F, -3.5F}, {0.15F, 0.6F, 0.4F}}),
-          cut_triangle({{-0.4F, -0.3F, 0.2F}, {1.9F, 1.1F, -4.5F}, {-0.2F, 0.5F, 0.5F}})};
+          cut_triangle({{-0.4F, -0.3F, 0.2F}, {1.9F, 1.1F, -4.5F}, {-0.2F, 0.5F, 0.5F}}),
+          cut_triangle({{-0.8F, -0.5F, -2.6F}, {0.9F, -0.6F, -3.0F}, {0.3F, 2.0F, -7.0F}}, 5.0F),
+          cut_triangle({{-2.8F, -1.0F, -7.0F}, {0.9F, 0.9F, -2.5F}, {1.5F, -2.8F, -8.0F}}, 5.0F)};
 }
 
 reference::Scene twin_of(const Scene& scene, bool is_opaque) {
