@@ -6,8 +6,8 @@
 // Faces are neighbours by the vertices that they share or, at edges where each has vertices of its own, where
 // these coincide (edges.cl): then there are two edges, one on each face's, and one of them stands for both.
 //
-// Edges end at the near plane where faces cross it, and the plane's cut of a face is a boundary: the cuts
-// of all faces are numbered behind the edges of the scene.
+// Edges end at the plane that faces cross, the near one or the far one, and the plane's cut of a face is a
+// boundary: the cuts of all faces are numbered behind the edges of the scene.
 #include "contour.h"
 #include "face_normal.h"
 
@@ -334,7 +334,7 @@ static inline float3 share_of_cut(const FrameParams p, global const ViewParams* 
   return (to_lost ? part : 1.0f - part) * cut_gradient(p, view, c, cut, grad, 0.0f);
 }
 
-/// Takes the gradients of edges away that contour_gather() has given to corners nearer than the near plane.
+/// Takes the gradients of edges away that contour_gather() has given to corners that are lost.
 /// One work-item per (view, vertex). Inputs as contour_count and contour_gather, and
 /// in out  grad_ndc  float4[view][vertex]
 kernel void contour_drop_near(const FrameParams p, global const ClippedFace* restrict clipped,
@@ -349,7 +349,7 @@ kernel void contour_drop_near(const FrameParams p, global const ClippedFace* res
   }
 }
 
-/// Adds the gradients of contours' ends on the near plane to those of the corners that these lie between. One
+/// Adds the gradients of contours' ends on a plane to those of the corners that these lie between. One
 /// work-item per (view, vertex). Deterministic. Inputs as contour_count and contour_gather, and
 /// in      views          ViewParams[view]
 /// in out  grad_clip      float4[view][vertex]  of homogeneous coordinates

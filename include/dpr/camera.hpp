@@ -34,8 +34,7 @@ enum class LensModel { brown, fisheye };
 /// The lens moves vertices. Between them edges and what is on faces stay straight, an edge of length l in
 /// tangents off by up to about 3/4 |k1| l^2 r (of a fisheye k1 - 1/3 for k1): subdivide_for_lens()
 /// (dpr/subdivision.hpp) cuts faces that are too large for that. From the radius on where the image would
-/// fold over (largest_radius()) points are held at it. Of faces that cross the near plane what is left is
-/// distorted.
+/// fold over (largest_radius()) points are held at it. What clipping leaves of faces is distorted.
 struct Distortion {
   float k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;  ///< p1 and p2 are 0 of a fisheye
   float k4 = 0;                                  ///< 0 of Brown's model
@@ -58,9 +57,9 @@ DPR_API double largest_radius(const Distortion& distortion);
 struct Camera {
   mat4 view{1.0F};              ///< world to camera; affine and invertible
   float fov_y_degrees = 60.0F;  ///< full vertical field of view, in (0, 180); ignored if intrinsics are given
-  std::optional<Intrinsics> intrinsics;    ///< instead of fov_y_degrees
-  float znear = 1.0F;                      ///< > 0, distance along the view direction
-  float zfar = 100.0F;                     ///< > znear
+  std::optional<Intrinsics> intrinsics;  ///< instead of fov_y_degrees
+  float znear = 1.0F;                    ///< > 0, distance along the view direction; faces are clipped there
+  float zfar = 100.0F;                   ///< > znear; faces that do not cross znear are clipped there
   std::optional<Distortion> distortion{};  ///< by the lens of a perspective camera
   /// Orthographic instead of perspective: > 0, world units from the lower to the upper edge of the image.
   /// Then there are neither intrinsics nor distortion, and fov_y_degrees is ignored.

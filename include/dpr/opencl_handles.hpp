@@ -58,7 +58,7 @@ struct Events {
 // The setters of Renderer, from buffers. They enqueue a copy into the renderer, which no later change of the
 // buffer reaches before the next call. Numbers that are not finite count as 0. Renderer::scene() and views()
 // keep the values that the host has given. The host does not know where vertices are then: every frame is
-// prepared for faces that cross the near plane, and noise on the pixel keeps the faces that look away in a
+// prepared for faces that cross the near or far plane, and noise on the pixel keeps the faces that look away in a
 // closed mesh: until Renderer::set_positions() of each such mesh, and Renderer::set_views() for matrices.
 // Faces with vertices of their own are one surface where these coincide, found anew on the device.
 

@@ -92,7 +92,7 @@ void add_clipping_notes(const Scene& scene, std::size_t entry, Json& notes) {
     if (count > 0) notes.push_back(counted(count, "triangle") + what);
   };
   add(counts.near, " nearer than znear: dropped when rendered");
-  add(counts.clipped, " clipped at znear");
+  add(counts.clipped, " clipped at znear or zfar");
   add(counts.far, " beyond zfar: dropped when rendered");
   add(counts.outside, " outside the image");
 }

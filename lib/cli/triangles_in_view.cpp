@@ -60,7 +60,7 @@ TrianglesInView triangles_in_view(const Scene& scene, std::size_t entry) {
       ++counts.far;
     } else if (edges.leaves_out(a, b, c)) {
       ++counts.outside;
-    } else if (low < scene.camera.znear) {
+    } else if (low < scene.camera.znear || high > scene.camera.zfar) {
       ++counts.clipped;
     }
   }

@@ -186,7 +186,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Transform transform;
   Setup setup;
   NearPlane near_plane;
-  Clip clip;  // of frames with faces that may cross the near plane
+  Clip clip;  // of frames with faces that may cross the near plane or the far one
   Bin bin;
   Rasterize rasterize;
   Shade shade;

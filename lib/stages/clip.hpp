@@ -1,5 +1,5 @@
-// Faces that cross the near plane: found, and rasterized in place of the whole triangles that other stages
-// know.
+// Faces that cross the near plane or the far one: found, and rasterized in place of the whole triangles that
+// other stages know.
 #pragma once
 
 #include <optional>
@@ -29,7 +29,7 @@ class Clip {
   /// shading needs to know nothing.
   void fragments(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                  Rasterize& rasterize);
-  /// Replaces the gradients of their corners, and adds those that go by way of the near plane, with what these
+  /// Replaces the gradients of their corners, and adds those that go by way of the plane, with what these
   /// give to projections and lenses.
   void backward(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles, const Bin& bin,
                 Rasterize& rasterize);

@@ -41,7 +41,7 @@ class Contour {
   /// Says how many pairs there are, after a forward_within() whose capacity was enough.
   void settle(std::size_t known_pairs);
   /// Adds the gradients of the pairs' ends to those of the vertices; where faces are clipped, those of ends
-  /// on the near plane to `grad_clip`, as Transform::backward() has it, and fills `grad_cuts`.
+  /// on the planes to `grad_clip`, as Transform::backward() has it, and fills `grad_cuts`.
   void gather(const ContourInputs& in, const Buffer<cl_float4>& grad_ends, Buffer<cl_float4>& grad_ndc,
               Buffer<cl_float4>& grad_clip);
 

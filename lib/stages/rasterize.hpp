@@ -159,7 +159,7 @@ class Rasterize {
   static constexpr std::size_t k_most_fragments =
       std::numeric_limits<cl_uint>::max() / (DPR_PLANE_BASE + 3) - k_widest_vector;
 
-  Clip* clip = nullptr;             ///< of frames with faces that cross the near plane
+  Clip* clip = nullptr;             ///< of frames with faces that cross a plane
   std::optional<Hiding> hiding;     ///< none: everything may be seen
   std::optional<Band> band;         ///< whose fragments these are
   std::size_t fragments = 0;        ///< of the band; or the capacity

@@ -95,7 +95,7 @@ TEST_SUITE("pipeline") {
     REQUIRE(scene["meshes"].size() == 2);
     CHECK(scene["meshes"][0]["file"] == "cube.ply");
     CHECK(notes(scene["meshes"][0], "2 triangles nearer than znear"));  // the front
-    CHECK(notes(scene["meshes"][0], "8 triangles clipped at znear"));   // all but the back
+    CHECK(notes(scene["meshes"][0], "8 triangles clipped at znear or zfar"));   // all but the back
     CHECK(scene["meshes"][1]["file"].is_null());
     CHECK(notes(scene["meshes"][1], "no colours: white"));
     const auto text = run_command(folder, {"info", "scene.json"});

@@ -245,7 +245,7 @@ class ArgumentsTest(unittest.TestCase):
         self.assertEqual(told(both, faces, 20), [])
         self.assertEqual(told(both, faces, None), [])
         self.assertEqual(told(both, faces[:2], 5), [])  # a vertex of no face
-        self.assertEqual(told(near - np.float32([[0, 0, 0], [0, 0, 0], [0, 0, 9]]), faces[:1], 5), [])  # drawn whole
+        self.assertEqual(told(near - np.float32([[0, 0, 0], [0, 0, 0], [0, 0, 9]]), faces[:1], 5), [])  # clipped
         self.assertEqual(told(both, faces, 5), [beyond.format(1, 5)])
         self.assertEqual(told(both, faces, 4.25, 2), [beyond.format(4, 4.25)])
         self.assertEqual(told(np.stack([near, near - np.float32([0, 0, 9])]), faces[:1], 5), [beyond.format(1, 5)])

@@ -30,8 +30,8 @@ class Renderer:
                     sigma = (2 blur / short side of the image)^2, in squared NDC, or the root of that with Euclidean
                     distances. 1 unless sigma or another preset than "pixel" is given
         znear, zfar world units, between which triangles are rendered. Left out, every view has powers of two around the
-                    depths of its vertices, the near one at least 1/1024 of the far one. Triangles that lie beyond zfar
-                    are left out, those that cross it drawn whole; at znear they are clipped.
+                    depths of its vertices, the near one at least 1/1024 of the far one. Triangles are clipped
+                    at both planes, those that cross both at znear alone.
         cull        "none", "back" or "front"
         shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
 
