@@ -33,7 +33,7 @@ typedef struct FrameParams {
   uint distorts;     /* some view does */
   uint normals;      /* of a view: those of the vertices, then those that meshes give */
   /* Where corners' indices of these begin among those of their vertices, which come first; 0: the same. */
-  uint color_faces, normal_faces, texcoord_faces;
+  uint color_faces, normal_faces, texcoord_faces, opacity_faces;
   uint texels, levels;            /* of all textures; of a pyramid, how many a fragment sees: 1 or 2 */
   uint has_base;                  /* fragments have base colours: the light falls on textures */
   uint fragments, grad_fragments; /* from one of their planes to the next */

@@ -65,7 +65,7 @@ class DPR_API AttributeImages {
 
   /// Renders what the renderer's last forward() shows: its scene, views, shapes, smoothing and culling as
   /// they are now. Throws InvalidArgument before that, for a renderer of another Device, for values that do
-  /// not fit its vertices, and for texcoords of a mesh without. What comes from buffers, as
+  /// not fit its vertices, for texcoords of a mesh without, and for opacities below 1. What comes from buffers, as
   /// dpr/opencl_handles.hpp has it, is followed on the device; that also does all of this without the host.
   void forward(const Renderer& renderer);
 

@@ -49,11 +49,17 @@ struct Mesh {
   std::vector<uvec3> face_normals{};            ///< [face] indices into normals, or empty
   std::vector<Material> materials{};            ///< or empty: one that changes nothing
   std::vector<std::uint32_t> face_materials{};  ///< [face] index into materials; empty: all have the first
+  /// The probability that a surface is there where it may cover a pixel, from 0 to 1: at most one of the two is
+  /// filled; with neither it is opaque. Below 1 it needs noise of the triangles (Noise::triangle), exact where the
+  /// composition is joint, and frames take longer: nothing is hidden. Images count 0 as 1e-6, and where the
+  /// gradient is asked for 1 as 1 - 1e-6, so that both have theirs.
+  std::vector<float> vertex_opacities{};  ///< [vertex], or empty
+  std::vector<float> face_opacities{};    ///< [face], or empty
 };
 
 /// Throws InvalidArgument unless the mesh can be rendered: at least one face, indices in range, finite
-/// positions, colours, normals, materials, texture coordinates and texels, arrays of matching length. `name`
-/// says in the message which mesh it is. O(vertices + faces + texels).
+/// positions, colours, normals, materials, texture coordinates and texels, opacities from 0 to 1, arrays of matching
+/// length. `name` says in the message which mesh it is. O(vertices + faces + texels).
 DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 
 /// Reads OBJ, PLY, OFF, STL, or glTF 2.0 (.gltf, .glb); vertices are in the order of the file. Polygons become
@@ -81,7 +87,7 @@ DPR_API Mesh read_mesh(const std::filesystem::path& file);
 /// faces. OBJ has no face colours: asking for that is an error, not a silent loss. Its textures become PNG files beside
 /// it (x.png; x.0.png, x.1.png of several), named by the materials of x.mtl. PLY colours are bytes, as other programs
 /// expect them: clamped to [0, 1] and rounded; it has no texture coordinates, textures or normals. Throws IoError, and
-/// InvalidArgument where the mesh is not valid.
+/// InvalidArgument where the mesh is not valid, or has opacities below 1.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 
 /// The six-coloured cube [-1, 1]^3 of the paper's experiments: 24 vertices (each side its own, so that

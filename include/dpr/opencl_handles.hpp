@@ -97,6 +97,11 @@ inline void set_materials(Renderer& renderer, std::size_t mesh, const BufferSpan
                           const Events& events = {}) {
   set_array(renderer, {ArrayId::materials, mesh}, materials, events);
 }
+/// [vertex] or [face], as the mesh has them; from 0 to 1, which is not checked.
+inline void set_opacities(Renderer& renderer, std::size_t mesh, const BufferSpan& opacities,
+                          const Events& events = {}) {
+  set_array(renderer, {ArrayId::opacities, mesh}, opacities, events);
+}
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,

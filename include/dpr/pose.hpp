@@ -221,7 +221,7 @@ class DPR_API PoseSolver {
   /// The target may be empty where LeastSquares has another observation. Throws InvalidArgument if the scene has several
   /// meshes and the options do not say which move, the first moving one's transform is singular, the sizes of target,
   /// mask, silhouette or depth differ from the scene's, one of these says nothing, the box holds nothing of the image,
-  /// or an option is out of its range.
+  /// an option is out of its range, or a mesh has opacities below 1.
   PoseSolver(Device device, Scene scene, const Image& target, PoseOptions options = {});
   /// From pictures by known cameras, in place of the scene's, which all count the same: the loss is their mean, each
   /// in a light of its own where light is found. A search begins at the places that the first view's images leave open;

@@ -59,6 +59,7 @@ struct MeshGradient {
   std::vector<vec3> normals{};      ///< [normal] object space
   std::vector<vec3> specular{};     ///< [material]
   std::vector<double> shininess{};  ///< [material] of the exponent in force, the material's or the lights'
+  std::vector<float> opacities{};   ///< [vertex] or [face], as the mesh has them; empty if not requested
 };
 
 /// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the
@@ -104,7 +105,7 @@ struct RenderStatistics {
 };
 
 /// Arrays of meshes that setters replace and backward passes differentiate.
-enum class ArrayId { positions, colors, texels, texcoords, normals, materials };
+enum class ArrayId { positions, colors, texels, texcoords, normals, materials, opacities };
 
 /// An array of a mesh of the scene, or the texels of one of its textures.
 struct ArrayRef {
@@ -114,7 +115,8 @@ struct ArrayRef {
   auto operator<=>(const ArrayRef&) const = default;
 };
 
-using ArrayValues = std::variant<std::span<const vec3>, std::span<const vec2>, std::span<const Material>>;
+using ArrayValues = std::variant<std::span<const vec3>, std::span<const vec2>, std::span<const Material>,
+                                 std::span<const float>>;
 
 /// Setters of the arrays of meshes, of a renderer on one device or several: its set_array() by name.
 template <class Owner>
@@ -141,6 +143,10 @@ class ArraySetters {
   /// For a mesh that has some: [material].
   void set_materials(std::size_t mesh, std::span<const Material> materials) {
     set({ArrayId::materials, mesh}, materials);
+  }
+  /// From 0 to 1, for a mesh that has some: [vertex] or [face]. Below 1 they need noise of the triangles.
+  void set_opacities(std::size_t mesh, std::span<const float> opacities) {
+    set({ArrayId::opacities, mesh}, opacities);
   }
 
  private:

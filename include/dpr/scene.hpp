@@ -43,6 +43,7 @@ struct GradientRequest {
   bool distortion = false;  ///< coefficients of lenses
   bool normals = false;     ///< normals that meshes give; 0 without lights
   bool materials = false;   ///< coefficients of the materials that meshes give; 0 without lights
+  bool opacities = false;   ///< vertex or face opacities
 
   bool operator==(const GradientRequest&) const = default;
 };

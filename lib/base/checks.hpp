@@ -80,6 +80,12 @@ inline void require_finite(float value, const std::string& argument) {
   if (!std::isfinite(value)) throw InvalidArgument(argument, text(value), "a finite number");
 }
 
+/// `argument` is called only where something is wrong.
+template <class Argument>
+void require_opacity(float value, const Argument& argument) {
+  if (!(value >= 0 && value <= 1)) throw InvalidArgument(argument(), text(value), "a number from 0 to 1");
+}
+
 inline void require_positive(float value, const std::string& argument) {
   if (value > 0 && std::isfinite(value)) return;
   throw InvalidArgument(argument, text(value), "a finite number > 0");

@@ -124,6 +124,8 @@ inline void add_looks(const Mesh& mesh, reference::Mesh& result) {
   for (const Material& m : mesh.materials)
     result.materials.push_back({to_reference(m.specular), m.shininess.value_or(0.0F)});
   result.face_materials.assign(mesh.face_materials.begin(), mesh.face_materials.end());
+  result.vertex_opacities.assign(mesh.vertex_opacities.begin(), mesh.vertex_opacities.end());
+  result.face_opacities.assign(mesh.face_opacities.begin(), mesh.face_opacities.end());
 }
 
 inline reference::Scene to_reference(const Scene& scene) {
@@ -222,6 +224,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
     add("positions", flat(found.meshes[m].positions));
     add("colors", flat(found.meshes[m].colors));
     if (!found.meshes[m].texcoords.empty()) add("texcoords", flat(found.meshes[m].texcoords));
+    const std::vector<float>& opacities = found.meshes[m].opacities;
+    if (!opacities.empty()) add("opacities", {opacities.begin(), opacities.end()});
     for (const std::vector<glm::vec3>& texels : found.meshes[m].textures) add("texels", flat(texels));
     const PoseGradient& pose = found.views[0].transforms[m];
     add("rotation", flat<glm::dvec3>({pose.rotation}));
@@ -257,6 +261,7 @@ inline std::vector<Block> blocks_of(const SceneGradient& found, const reference:
     set(flat(mesh.positions));
     set(flat(mesh.colors));
     if (!mesh.texcoords.empty()) set(flat(mesh.texcoords));
+    if (!mesh.opacities.empty()) set(mesh.opacities);
     for (const std::vector<reference::Vec3d>& texels : mesh.textures) set(flat(texels));
     set(flat<reference::Vec3d>({mesh.rotation}));
     set(flat<reference::Vec3d>({mesh.translation}));

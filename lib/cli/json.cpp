@@ -60,6 +60,12 @@ Json to_json(const std::vector<glm::vec2>& vectors) {
 
 Json to_json(const std::vector<double>& numbers) { return numbers; }
 
+Json to_json(const std::vector<float>& numbers) {
+  Json list = Json::array();
+  for (const float v : numbers) list.push_back(number(v));
+  return list;
+}
+
 void add_found_light(Json& json, const Lights& light) {
   const Json harmonics = to_json(light.harmonics);
   json["harmonics"] = harmonics;

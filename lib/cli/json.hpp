@@ -21,6 +21,7 @@ Json to_json(const glm::dvec3& v);
 Json to_json(const std::vector<glm::vec3>& vectors);
 Json to_json(const std::vector<glm::vec2>& vectors);
 Json to_json(const std::vector<double>& numbers);
+Json to_json(const std::vector<float>& numbers);
 Json to_json(const std::vector<std::vector<glm::vec3>>& lists);
 /// Adds a distant light that was found: its "harmonics", and "lights" as a scene takes them.
 void add_found_light(Json& json, const Lights& light);

@@ -13,7 +13,7 @@ namespace {
 
 struct Sum {
   glm::dvec3 position{0.0}, color{0.0};
-  double count = 0;
+  double opacity = 0, count = 0;
 };
 
 /// The cell of every vertex, counted in the order of first use.
@@ -48,6 +48,7 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
     Sum& sum = sums[cells[i]];
     sum.position += glm::dvec3(mesh.positions[i]);
     if (!mesh.vertex_colors.empty()) sum.color += glm::dvec3(mesh.vertex_colors[i]);
+    if (!mesh.vertex_opacities.empty()) sum.opacity += static_cast<double>(mesh.vertex_opacities[i]);
     ++sum.count;
   }
   Mesh result;
@@ -57,6 +58,8 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
   for (const Sum& sum : sums) {
     result.positions.emplace_back(sum.position / sum.count);
     if (!mesh.vertex_colors.empty()) result.vertex_colors.emplace_back(sum.color / sum.count);
+    if (!mesh.vertex_opacities.empty())
+      result.vertex_opacities.push_back(static_cast<float>(sum.opacity / sum.count));
   }
   std::set<std::array<std::uint32_t, 3>> known;
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
@@ -65,6 +68,7 @@ Mesh cluster_vertices(const Mesh& mesh, float cell) {
     if (!known.insert(canonical(face)).second) continue;
     result.faces.push_back(face);
     if (!mesh.face_colors.empty()) result.face_colors.push_back(mesh.face_colors[i]);
+    if (!mesh.face_opacities.empty()) result.face_opacities.push_back(mesh.face_opacities[i]);
     if (!mesh.face_texcoords.empty()) result.face_texcoords.push_back(mesh.face_texcoords[i]);
     if (!mesh.face_textures.empty()) result.face_textures.push_back(mesh.face_textures[i]);
     if (!mesh.face_materials.empty()) result.face_materials.push_back(mesh.face_materials[i]);

@@ -100,6 +100,16 @@ void validate_materials(const Mesh& mesh, const std::string& name) {
   }
 }
 
+void validate_opacities(const std::vector<float>& opacities, std::size_t expected, const std::string& list,
+                        const std::string& elements, const std::string& name) {
+  if (!opacities.empty() && opacities.size() != expected) {
+    throw InvalidArgument(checks::in(list, name), std::to_string(opacities.size()) + " opacities",
+                          std::to_string(expected) + ", one for each of the " + elements + ", or none");
+  }
+  for (std::size_t i = 0; i < opacities.size(); ++i)
+    checks::require_opacity(opacities[i], [&] { return checks::in(checks::element(list, i), name); });
+}
+
 void validate_faces(const Mesh& mesh, const std::string& name) {
   for (std::size_t i = 0; i < mesh.faces.size(); ++i) {
     for (int corner = 0; corner < 3; ++corner) {
@@ -141,6 +151,12 @@ void validate(const Mesh& mesh, const std::string& name) {
   validate_textures(mesh, name);
   validate_normals(mesh, name);
   validate_materials(mesh, name);
+  if (!mesh.vertex_opacities.empty() && !mesh.face_opacities.empty()) {
+    throw InvalidArgument(checks::in("vertex_opacities", name), "them beside face_opacities",
+                          "at most one of the two");
+  }
+  validate_opacities(mesh.vertex_opacities, mesh.positions.size(), "vertex_opacities", "vertices", name);
+  validate_opacities(mesh.face_opacities, mesh.faces.size(), "face_opacities", "faces", name);
 }
 
 }  // namespace dpr

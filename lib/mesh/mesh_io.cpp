@@ -9,6 +9,7 @@
 #include "dpr/notes.hpp"
 #include "image/codec.hpp"
 #include "mesh/mesh_reader.hpp"
+#include "mesh/opacity.hpp"
 #include "mesh/scan_text.hpp"
 
 namespace dpr {
@@ -151,6 +152,7 @@ void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
     throw IoError(file, "got the extension " + scan::quoted(extension) + ", expected .obj, .ply or .glb");
   }
   validate(mesh, "mesh for " + file.string());
+  require_opaque(mesh, "mesh for " + file.string());
   if (extension == ".obj") {
     const std::string text = obj_text(file, mesh);
     if (!mesh.textures.empty()) write_obj_materials(file, mesh);

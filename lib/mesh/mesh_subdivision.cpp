@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "base/checks.hpp"
@@ -128,12 +129,23 @@ void require_count(std::size_t expected, std::size_t found, const std::string& w
                         std::to_string(expected) + ", as the mesh has that was cut");
 }
 
-std::vector<glm::vec3> sum_over_pieces(const std::vector<std::uint32_t>& face_of,
-                                       const std::vector<glm::vec3>& gradient, std::size_t faces) {
-  require_at_least(face_of.size(), gradient.size(), "gradient of colours");
-  std::vector<glm::dvec3> sums(faces, glm::dvec3(0));
-  for (std::size_t i = 0; i < face_of.size(); ++i) sums[face_of[i]] += glm::dvec3(gradient[i]);
+template <typename Value>
+std::vector<Value> sum_over_pieces(const std::vector<std::uint32_t>& face_of,
+                                   const std::vector<Value>& gradient, std::size_t faces) {
+  using Total = std::conditional_t<std::is_same_v<Value, float>, double, glm::dvec3>;
+  require_at_least(face_of.size(), gradient.size(), "gradient of what faces have");
+  std::vector<Total> sums(faces, Total(0));
+  for (std::size_t i = 0; i < face_of.size(); ++i) sums[face_of[i]] += Total(gradient[i]);
   return {sums.begin(), sums.end()};
+}
+
+/// The gradient of an array of vertices, or of faces.
+template <typename Value>
+std::vector<Value> of_whole(const MeshSubdivision& subdivision, const std::vector<Value>& of_pieces,
+                            bool is_of_faces) {
+  if (of_pieces.empty()) return {};
+  return is_of_faces ? sum_over_pieces(subdivision.face_of, of_pieces, subdivision.old_faces)
+                     : pulled_back(subdivision.vertices, of_pieces, subdivision.old_positions);
 }
 
 /// The sums of the normals of the faces around vertices, twice their area long.
@@ -267,10 +279,12 @@ Mesh subdivide(const Mesh& mesh, const MeshSubdivision& subdivision) {
   Combinations list;
   result.positions = combined(subdivision.vertices, mesh.positions);
   result.vertex_colors = combined(subdivision.vertices, mesh.vertex_colors);
+  result.vertex_opacities = combined(subdivision.vertices, mesh.vertex_opacities);
   result.faces = combine_corners(subdivision, mesh.faces, mesh.positions.size(), list);
   result.texcoords = combined(subdivision.texcoords, mesh.texcoords);
   result.face_texcoords = combine_corners(subdivision, mesh.face_texcoords, mesh.texcoords.size(), list);
   result.face_colors = of_pieces(subdivision.face_of, mesh.face_colors);
+  result.face_opacities = of_pieces(subdivision.face_of, mesh.face_opacities);
   result.face_textures = of_pieces(subdivision.face_of, mesh.face_textures);
   result.face_materials = of_pieces(subdivision.face_of, mesh.face_materials);
   result.normals = combined(subdivision.normals, directions_of(old_normals(mesh, subdivision)));
@@ -285,11 +299,8 @@ MeshGradient pull_back(const Mesh& mesh, const MeshSubdivision& subdivision, con
   require_same_counts(mesh, subdivision);
   MeshGradient result = of_pieces;
   result.positions = pulled_back(subdivision.vertices, of_pieces.positions, mesh.positions.size());
-  if (!of_pieces.colors.empty()) {
-    result.colors = mesh.face_colors.empty()
-                        ? pulled_back(subdivision.vertices, of_pieces.colors, mesh.positions.size())
-                        : sum_over_pieces(subdivision.face_of, of_pieces.colors, mesh.faces.size());
-  }
+  result.colors = of_whole(subdivision, of_pieces.colors, !mesh.face_colors.empty());
+  result.opacities = of_whole(subdivision, of_pieces.opacities, !mesh.face_opacities.empty());
   result.texcoords = pulled_back(subdivision.texcoords, of_pieces.texcoords, mesh.texcoords.size());
   if (of_pieces.normals.empty() || subdivision.normals.of.empty()) return result;
   const std::vector<glm::dvec3> normals = old_normals(mesh, subdivision);

@@ -11,6 +11,7 @@
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/scene_parts.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 
@@ -53,6 +54,7 @@ void MultiDeviceRenderer::set_smoothing(const Smoothing& smoothing) {
   validate(smoothing);
   for (const View& view : impl_->views)
     require_scales(view.camera, smoothing, impl_->scene.lights.has_value());
+  if (is_see_through(impl_->scene)) require_sees_through(smoothing);
   impl_->scene.smoothing = smoothing;
   ++impl_->now.smoothing;
 }

@@ -6,7 +6,7 @@
 #include "aggregate.hpp"
 #include "clip.hpp"
 #include "loss.hpp"
-#include "occupancy.hpp"
+#include "opacity.hpp"
 #include "rasterize.hpp"
 #include "scene.hpp"
 #include "shade.hpp"
@@ -27,6 +27,7 @@ struct MeshGradient {
   Vec3d translation;
   std::vector<Vec2d> texcoords;
   std::vector<std::vector<Vec3d>> textures;  ///< texels of each
+  std::vector<double> opacities{};           ///< follows vertex_opacities or face_opacities
 };
 
 struct CameraGradient {
@@ -135,25 +136,6 @@ inline bool is_perspective_correct(const Scene& scene) {
   return scene.perspective_correct && !scene.camera.orthographic_height;
 }
 
-/// Empty where no mesh has materials or normals of its own.
-inline std::vector<FaceLook> face_looks(const Scene& scene) {
-  std::vector<FaceLook> looks;
-  bool is_plain = true;
-  for (const Mesh& mesh : scene.meshes) {
-    is_plain = is_plain && mesh.materials.empty() && mesh.face_normals.empty();
-    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-      FaceLook& look = looks.emplace_back();
-      if (!mesh.materials.empty())
-        look.material = mesh.materials[mesh.face_materials.empty() ? 0 : mesh.face_materials[f]];
-      if (mesh.face_normals.empty()) continue;
-      look.normals.emplace();
-      for (std::size_t i = 0; i < 3; ++i)
-        (*look.normals)[i] = transformed_normal(mesh.transform, mesh.normals[mesh.face_normals[f][i]]);
-    }
-  }
-  return is_plain ? std::vector<FaceLook>() : looks;
-}
-
 inline PreparedScene prepare(const Scene& scene) {
   PreparedScene prepared;
   const ImageSize size{scene.width, scene.height};
@@ -235,13 +217,23 @@ inline std::vector<Fragment> pixel_fragments(const Scene& scene, const PreparedS
   return fragments;
 }
 
+inline Occupancy surface_occupancy(const Smoothing& s, const Fragment& fragment) {
+  return occupancy_forward(s.occupancy_prior, fragment.distance, s.sigma);
+}
+
+inline Vec3d corner_opacities(const Scene& scene, const PreparedScene& prepared, std::size_t face) {
+  const std::size_t m = prepared.face_mesh[face];
+  return corner_opacities(scene.meshes[m], face - prepared.first_face[m]);
+}
+
 /// Occupancies and colours of a pixel's fragments: what aggregation takes.
 inline std::vector<FragmentInput> aggregate_inputs(const Scene& scene, const PreparedScene& prepared,
                                                    const std::vector<Fragment>& fragments) {
   std::vector<FragmentInput> inputs;
   for (const Fragment& fragment : fragments) {
     const Occupancy occupancy =
-        occupancy_forward(scene.smoothing.occupancy_prior, fragment.distance, scene.smoothing.sigma);
+        opacity_forward(surface_occupancy(scene.smoothing, fragment),
+                        corner_opacities(scene, prepared, fragment.face), fragment.barycentric);
     const Vec3d color = shade_forward(prepared.shade, fragment.face, fragment.barycentric,
                                       base_of_face(scene, prepared, fragment.face));
     inputs.push_back({fragment.depth, occupancy.p, occupancy.log_p, color});
@@ -306,14 +298,21 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
   for (std::size_t k = 0; k < fragments.size(); ++k) {
     const Fragment& fragment = fragments[k];
     const FragmentInputGradient& input = aggregate.fragments[k];
-    const OccupancyGradient occupancy = occupancy_backward(s.occupancy_prior, fragment.distance, s.sigma,
-                                                           input.occupancy, input.log_occupancy);
+    const OpacityGradient opacity =
+        opacity_backward(surface_occupancy(s, fragment), corner_opacities(scene, prepared, fragment.face),
+                         fragment.barycentric, input.occupancy, input.log_occupancy);
+    const std::size_t m = prepared.face_mesh[fragment.face];
+    add_opacity_gradient(scene.meshes[m], fragment.face - prepared.first_face[m], opacity.corners,
+                         grad.meshes[m].opacities);
+    const OccupancyGradient occupancy =
+        occupancy_backward(s.occupancy_prior, fragment.distance, s.sigma, opacity.p, opacity.log_p);
     grad.sigma += occupancy.sigma;
     const ShadeFragmentGradient shade =
         shade_backward(prepared.shade, fragment.face, fragment.barycentric,
                        base_of_face(scene, prepared, fragment.face), input.color, sums.shade);
     add_color_gradient(scene, prepared, fragment.face, shade, grad);
-    const FragmentGradient grad_fragment{occupancy.distance, input.depth, shade.barycentric};
+    const FragmentGradient grad_fragment{occupancy.distance, input.depth,
+                                         shade.barycentric + opacity.barycentric};
     const bool clips = is_clipped(prepared, fragment.face);
     NdcTriangle corners;
     if (clips) {
@@ -380,6 +379,7 @@ inline Gradients gradient(const Scene& scene, const Image& grad_image) {
                            {}});
     for (const Texture& texture : mesh.textures)
       grad.meshes.back().textures.emplace_back(texture.texels.size());
+    grad.meshes.back().opacities.resize(mesh.vertex_opacities.size() + mesh.face_opacities.size());
   }
   PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()),
                  std::vector<Vec3d>(prepared.vertices.size()),

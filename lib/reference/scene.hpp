@@ -26,6 +26,8 @@ struct Mesh {
   std::vector<Face> face_normals{};  ///< indices into normals, or empty
   std::vector<Material> materials{};
   std::vector<std::size_t> face_materials{};  ///< one per face; empty: all faces have the first
+  std::vector<double> vertex_opacities{};     ///< one per vertex, or empty
+  std::vector<double> face_opacities{};       ///< one per face, or empty; without any the mesh is opaque
 };
 
 struct Smoothing {
@@ -50,5 +52,24 @@ struct Scene {
   Smoothing smoothing;
   bool perspective_correct = true;
 };
+
+/// Empty where no mesh has materials or normals of its own.
+inline std::vector<FaceLook> face_looks(const Scene& scene) {
+  std::vector<FaceLook> looks;
+  bool is_plain = true;
+  for (const Mesh& mesh : scene.meshes) {
+    is_plain = is_plain && mesh.materials.empty() && mesh.face_normals.empty();
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+      FaceLook& look = looks.emplace_back();
+      if (!mesh.materials.empty())
+        look.material = mesh.materials[mesh.face_materials.empty() ? 0 : mesh.face_materials[f]];
+      if (mesh.face_normals.empty()) continue;
+      look.normals.emplace();
+      for (std::size_t i = 0; i < 3; ++i)
+        (*look.normals)[i] = transformed_normal(mesh.transform, mesh.normals[mesh.face_normals[f][i]]);
+    }
+  }
+  return is_plain ? std::vector<FaceLook>() : looks;
+}
 
 }  // namespace dpr::reference

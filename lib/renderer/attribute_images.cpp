@@ -225,6 +225,8 @@ void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
 
 void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
   require_values(source);
+  if (source.is_see_through)
+    throw InvalidArgument("opacities (attribute images)", "some below 1", "an opaque scene: 1, or none");
   views = 0;  // until everything is there
   if (attribute == Attribute::texcoords) texcoords_ = source.corner_texcoords;
   follow(source);

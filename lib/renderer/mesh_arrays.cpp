@@ -8,6 +8,7 @@
 #include "base/checks.hpp"
 #include "mesh/bounding_box.hpp"
 #include "renderer/on_device.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 namespace {
@@ -34,6 +35,16 @@ HostArray host_colors(Mesh& mesh, std::size_t) {
   return mesh.vertex_colors.empty() ? &mesh.face_colors : &mesh.vertex_colors;
 }
 
+HostArray host_opacities(Mesh& mesh, std::size_t) {
+  return mesh.vertex_opacities.empty() ? &mesh.face_opacities : &mesh.vertex_opacities;
+}
+
+/// Those that the device alone knows may be any.
+void find_see_through(Impl& m, std::size_t, bool on_host) {
+  m.has_device_opacities = m.has_device_opacities || !on_host;
+  m.is_see_through = m.has_device_opacities || is_see_through(m.scene);
+}
+
 bool has_colors(const Mesh& mesh) { return !mesh.vertex_colors.empty() || !mesh.face_colors.empty(); }
 bool has_textures(const Mesh& mesh) { return !mesh.textures.empty(); }
 
@@ -57,6 +68,7 @@ struct DeviceArray {
   static Buffer<cl_float4>& texcoords(Geometry& g) { return g.textures.texcoord_values; }
   static Buffer<cl_float4>& normals(Geometry& g) { return g.given_normals.values; }
   static Buffer<cl_float4>& materials(Geometry& g) { return g.materials.values; }
+  static Buffer<cl_float4>& opacities(Geometry& g) { return g.opacities.values; }
 };
 
 /// The gradients of them that a backward pass leaves.
@@ -67,6 +79,7 @@ struct Gradients {
   static const Buffer<cl_float4>& texcoords(const Impl& m) { return m.grad_texcoords; }
   static const Buffer<cl_float4>& normals(const Impl& m) { return m.shade.grad_given_normals; }
   static const Buffer<cl_float4>& materials(const Impl& m) { return m.grad_materials; }
+  static const Buffer<cl_float4>& opacities(const Impl& m) { return m.grad_opacities; }
 };
 
 HostArray host_texels(Mesh& mesh, std::size_t texture) { return &mesh.textures[texture].texels; }
@@ -135,8 +148,19 @@ constexpr MeshArray k_materials{.name = "materials",
                                 .gradient = Gradients::materials,
                                 .exists = has_materials,
                                 .what = "materials"};
+constexpr MeshArray k_opacities{.name = "opacities",
+                                .components = 1,
+                                .wanted = &Request::opacities,
+                                .host = host_opacities,
+                                .device = DeviceArray::opacities,
+                                .first = first_of<&MeshRange::first_opacity>,
+                                .gradient = Gradients::opacities,
+                                .changed = find_see_through,
+                                .exists = has_opacities,
+                                .what = "opacities"};
 /// In the order of ArrayId.
-constexpr std::array k_arrays{k_positions, k_colors, k_texels, k_texcoords, k_normals, k_materials};
+constexpr std::array k_arrays{k_positions, k_colors,    k_texels,   k_texcoords,
+                              k_normals,   k_materials, k_opacities};
 
 [[noreturn]] void refuse_mesh(const ArrayRef& at) {
   throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row_of(at.id).what,
@@ -180,6 +204,10 @@ HostArray require_array(Scene& scene, const ArrayRef& at, const ArrayValues& val
   if (array.index() != values.index())
     throw InvalidArgument(row.name, "elements of another type", "the type that Mesh holds");
   require_count(row.name, values, count_of(array));
+  if (const auto* const opacities = std::get_if<std::span<const float>>(&values)) {
+    if (std::ranges::any_of(*opacities, [](float opacity) { return opacity < 1; }))
+      require_sees_through(scene.smoothing);
+  }
   return array;
 }
 
@@ -201,7 +229,7 @@ void assign(const HostArray& array, const ArrayValues& values) {
 void require_count(const char* name, const ArrayValues& values, std::size_t expected) {
   const auto check = [&]<class Element>(std::span<const Element> list) {
     if (list.size() == expected) return;
-    constexpr bool is_vector = !std::is_same_v<Element, Material>;
+    constexpr bool is_vector = !std::is_same_v<Element, Material> && !std::is_same_v<Element, float>;
     throw InvalidArgument(name, std::to_string(list.size()) + (is_vector ? " vectors" : ""),
                           std::to_string(expected));
   };
@@ -213,7 +241,7 @@ void check_values(const char* name, const ArrayValues& values) {
     if constexpr (std::is_same_v<Element, Material>) {
       for (std::size_t i = 0; i < list.size(); ++i) validate(list[i], checks::element(name, i));
     } else {
-      require_finite(name, list, 0);
+      require_valid(name, list, 0);
     }
   };
   std::visit(check, values);
@@ -232,7 +260,7 @@ void copy_checked(const char* name, std::span<const Vector> from, std::vector<Ve
   to.reserve(from.size());
   for (std::size_t first = 0; first < from.size(); first += k_block) {
     const std::span<const Vector> block = from.subspan(first, std::min(k_block, from.size() - first));
-    require_finite(name, block, first);
+    require_valid(name, block, first);
     to.insert(to.end(), block.begin(), block.end());
     if constexpr (std::is_same_v<Vector, glm::vec3>) {
       if (box == nullptr) continue;
@@ -329,6 +357,7 @@ void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values,
   const MeshArray& row = row_of(at.id);
   const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
   if (shape.count == 0) refuse_mesh(at);
+  if (at.id == ArrayId::opacities) require_sees_through(m.scene.smoothing);
   const FloatVectors from = require_vectors(impl_of(m.device), values, shape, Access::read, row.name);
   enqueue(impl_of(m.device), events, [&] { m.take(at, shape.count, from); });
 }

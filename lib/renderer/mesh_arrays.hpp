@@ -7,6 +7,7 @@
 #include <glm/glm.hpp>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -22,9 +23,11 @@ struct Geometry;
 
 inline glm::vec3 to_vec3(const glm::vec3& vector) { return vector; }
 inline glm::vec3 to_vec3(const glm::vec2& pair) { return {pair, 0}; }
+inline glm::vec3 to_vec3(float number) { return {number, 0, 0}; }
 
 /// Place of an array's elements on the host.
-using HostArray = std::variant<std::vector<glm::vec3>*, std::vector<glm::vec2>*, std::vector<Material>*>;
+using HostArray = std::variant<std::vector<glm::vec3>*, std::vector<glm::vec2>*, std::vector<Material>*,
+                               std::vector<float>*>;
 
 struct MeshArray {
   const char* name;        ///< argument of the setter, which is set_<name>
@@ -66,13 +69,18 @@ void assign(const HostArray& array, const ArrayValues& values);
 void require_count(const char* name, const ArrayValues& values, std::size_t expected);
 /// Throws InvalidArgument unless all values are valid.
 void check_values(const char* name, const ArrayValues& values);
-/// The same of vectors, of which the first is element `first`.
+/// The same of vectors, or of opacities, of which the first is element `first`.
 template <class Vector>
-void require_finite(const char* name, std::span<const Vector> vectors, std::size_t first) {
-  const std::span<const float> numbers = checks::floats_of(vectors);
-  const std::size_t place = checks::first_not_finite(numbers) / static_cast<std::size_t>(Vector::length());
-  if (place < vectors.size())
-    checks::require_finite(to_vec3(vectors[place]), checks::element(name, first + place));
+void require_valid(const char* name, std::span<const Vector> vectors, std::size_t first) {
+  if constexpr (std::is_same_v<Vector, float>) {
+    for (std::size_t i = 0; i < vectors.size(); ++i)
+      checks::require_opacity(vectors[i], [&] { return checks::element(name, first + i); });
+  } else {
+    const std::span<const float> numbers = checks::floats_of(vectors);
+    const std::size_t place = checks::first_not_finite(numbers) / static_cast<std::size_t>(Vector::length());
+    if (place < vectors.size())
+      checks::require_finite(to_vec3(vectors[place]), checks::element(name, first + place));
+  }
 }
 
 }  // namespace dpr

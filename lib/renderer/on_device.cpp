@@ -131,13 +131,14 @@ void copy_view(Renderer::Impl& m, const BufferView& view, const BufferSpan& span
 
 namespace {
 
-/// Materials' exponents lie behind the three numbers of their specular coefficients.
+/// Materials' exponents lie behind the three numbers of their specular coefficients, opacities come first.
 std::optional<BufferView> view_of(const std::optional<DeviceGradient>& gradient, const GradientArray& array) {
   if (!gradient) return std::nullopt;
-  const bool is_number = std::holds_alternative<std::vector<double>*>(array);
+  const bool is_exponent = std::holds_alternative<std::vector<double>*>(array);
+  const bool is_number = is_exponent || std::holds_alternative<std::vector<float>*>(array);
   const bool is_pair = std::holds_alternative<std::vector<glm::vec2>*>(array);
   return BufferView{gradient->values.cl_buffer()(),
-                    gradient->first * sizeof(cl_float4) + (is_number ? k_vector * sizeof(float) : 0),
+                    gradient->first * sizeof(cl_float4) + (is_exponent ? k_vector * sizeof(float) : 0),
                     sizeof(cl_float4), gradient->count,
                     is_number ? 1
                     : is_pair ? k_pair

@@ -8,6 +8,7 @@
 #include "dpr/error.hpp"
 #include "renderer/frame.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 namespace {
@@ -33,6 +34,7 @@ Renderer::Impl::Impl(Device device_)
       rasterize(impl_of(device)),
       shade(impl_of(device)),
       occupancy(impl_of(device)),
+      opacity(impl_of(device)),
       aggregate(impl_of(device)),
       gather(impl_of(device)),
       reduce(impl_of(device)) {}
@@ -53,6 +55,7 @@ void Renderer::Impl::require_forward(const char* caller) {
 
 void Renderer::Impl::forward(FrameSizes sizes) {
   require_scene("Renderer::forward");
+  if (is_see_through || wants(ArrayId::opacities)) require_sees_through(scene.smoothing);
   rendered = false;
   build_pyramids();
   transform.forward(frame, device_views, *geometry, shade.lit());
@@ -81,6 +84,7 @@ void Renderer::Impl::build_pyramids() {
 }
 
 void Renderer::Impl::set_up() {
+  opacity.set_bounds(scene.smoothing.composition, follows_opacities_ || wants(ArrayId::opacities));
   frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
   frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
   if (pixel_noise) {
@@ -89,7 +93,7 @@ void Renderer::Impl::set_up() {
   }
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
-  if (std::isfinite(hidden_reach) && layers == 1)
+  if (std::isfinite(hidden_reach) && layers == 1 && !sees_through())
     rasterize.hiding.emplace(hidden_reach, device_views.cameras);
   const Buffer<float>& hidden = hides_by_device_ ? setup.hide(frame, hidden_) : hidden_;
   setup.forward(frame, device_views, *geometry, transform.ndc, hidden, bin.pair_starts);
@@ -242,10 +246,19 @@ void Renderer::Impl::render(const Band& band) {
 void Renderer::Impl::shade_and_aggregate() {
   shade.forward(shade_inputs());
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
+  if (sees_through()) opacity.forward(frame, *geometry, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour);
   pixel_noise->unblend();
+}
+
+/// Renders the last frame again if its opaque surfaces hide what derivatives by their opacities need.
+void Renderer::Impl::follow_opacities() {
+  if (opacity.is_bounded()) return;
+  follows_opacities_ = true;
+  render_again();
+  follows_opacities_ = false;
 }
 
 Buffer<cl_float4>& Renderer::Impl::room_for_grad_images(std::size_t pixels) {
@@ -276,6 +289,10 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     throw InvalidArgument("gradient of the camera (backward)",
                           "a lit scene, with view matrices from a buffer",
                           "Renderer::set_views(): the eye's part of it needs their inverses");
+  }
+  if (wants(ArrayId::opacities)) {
+    require_sees_through(scene.smoothing);
+    follow_opacities();
   }
   if (!sample_bands.empty()) {
     if (pixel_noise->lacks_image(wanted.smoothing)) render_again();
@@ -326,13 +343,15 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images, sums_pixels());
-  // Distances without noise have no gradient, and rasterization does not read one.
-  if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise) {
-    occupancy.backward(frame, bin, rasterize);
-  }
   const bool textured = !geometry->textures.empty();
   if (geometric || wanted.colors || wanted.materials || (textured && (wanted.texture || wanted.texcoords))) {
     shade.backward(shade_inputs());
+  }
+  if (sees_through() && (geometric || wanted.smoothing || wants(ArrayId::opacities)))
+    opacity.backward(frame, *geometry, bin, rasterize, occupancy.is_sampled());
+  // Distances without noise have no gradient, and rasterization does not read one.
+  if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise) {
+    occupancy.backward(frame, bin, rasterize);
   }
   if (textured && wanted.texture) {
     shade.list_texels(shade_inputs());
@@ -351,7 +370,7 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
 
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
-         rasterize.bytes() + shade.bytes() + occupancy.bytes() + aggregate.bytes() +
+         rasterize.bytes() + shade.bytes() + occupancy.bytes() + opacity.bytes() + aggregate.bytes() +
          (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
          (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
          own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() +
@@ -361,9 +380,9 @@ std::size_t Renderer::Impl::bytes() const {
          spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +
          grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
          grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
-         grad_materials.capacity_bytes() + grad_numbers.capacity_bytes() + gradient_sums_.capacity_bytes() +
-         (gradient_map ? gradient_map->bytes() : 0) + aov_surface.capacity_bytes() +
-         aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
+         grad_materials.capacity_bytes() + grad_opacities.capacity_bytes() + grad_numbers.capacity_bytes() +
+         gradient_sums_.capacity_bytes() + (gradient_map ? gradient_map->bytes() : 0) +
+         aov_surface.capacity_bytes() + aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
          all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() +
          (corner_texcoords ? corner_texcoords->bytes() : 0);
 }

@@ -6,6 +6,7 @@
 #include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 
@@ -32,6 +33,7 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
   for (const View& view : impl_->views) {
     require_scales(view.camera, smoothing, impl_->scene.lights.has_value());
   }
+  if (impl_->is_see_through) require_sees_through(smoothing);
   impl_->set(impl_->prepare(smoothing));
 }
 

@@ -32,7 +32,13 @@ class RowReads {
     buffer.download(rows, first, reads_);
     arrivals_.emplace_back([rows, &out] {
       out.reserve(rows.size());
-      for (const cl_float4& v : rows) out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
+      for (const cl_float4& v : rows) {
+        if constexpr (std::is_same_v<Vector, float>) {
+          out.push_back(v.s[0]);
+        } else {
+          out.emplace_back(glm::vec3(v.s[0], v.s[1], v.s[2]));
+        }
+      }
     });
     used_ += count;
   }
@@ -52,7 +58,7 @@ class RowReads {
     out.resize(count);
     packed_.resize(impl_of(renderer_.device), k_components * count);
     renderer_.made_exchange().pack(buffer, first, k_components, count, packed_);
-    packed_.download({&out.front().x, k_components * count}, 0, reads_);
+    packed_.download({reinterpret_cast<float*>(out.data()), k_components * count}, 0, reads_);
   }
 
   Renderer::Impl& renderer_;
@@ -81,6 +87,9 @@ void Renderer::Impl::gather_mesh_gradients(const AddToGradient& add_to_positions
     gather.over_views(frame, geometry->textures.texcoords, bin, geometry->textures.texcoord_corners,
                       {shade.grad_pairs, DPR_PAIR_TEXCOORDS * bin.pairs}, grad_texcoords);
   }
+  if (wants(ArrayId::opacities))
+    gather.over_views(frame, geometry->opacities.values.size(), bin, geometry->opacities.corners,
+                      opacity.grad_pairs, grad_opacities);
   if (wants(ArrayId::materials))
     gather.over_views(frame, bin, geometry->materials,
                       {shade.grad_pairs, (shade.first_lit_channel() + DPR_PAIR_MATERIAL) * bin.pairs},
@@ -124,6 +133,7 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, RowReads& rows
     };
     if (auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array)) read(**vectors);
     if (auto* const* pairs = std::get_if<std::vector<glm::vec2>*>(&array)) read(**pairs);
+    if (auto* const* numbers = std::get_if<std::vector<float>*>(&array)) read(**numbers);
     if (auto* const* textures = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array)) {
       if (scene.gradients.texture) (*textures)->resize(scene.meshes[index.item].mesh.textures.size());
       for (std::size_t k = 0; k < (*textures)->size(); ++k) read((**textures)[k], k);

@@ -22,6 +22,7 @@
 #include "stages/gather.hpp"
 #include "stages/geometry.hpp"
 #include "stages/occupancy.hpp"
+#include "stages/opacity.hpp"
 #include "stages/rasterize.hpp"
 #include "stages/reduce.hpp"
 #include "stages/samples.hpp"
@@ -177,7 +178,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::uint64_t frame_number = 0;           // which frame that is, among all renderers'
 
   float hidden_reach = 0;  // normalised depth behind a triangle from where on nothing is seen; or infinite
-  cl_uint layers = 1;      // surfaces of a sample that shading of the caller's own sees
+  /// Some opacity is, or may be, below 1: nothing is hidden then.
+  bool is_see_through = false;
+  bool has_device_opacities = false;  // which the host does not know
+  cl_uint layers = 1;                 // surfaces of a sample that shading of the caller's own sees
 
   std::optional<Geometry> geometry;
   std::vector<Band> bands;          // of the last forward()
@@ -192,6 +196,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Shade shade;
   std::optional<GeometryColors> geometry_colors;  // of views' own shapes, in place of those that are set
   Occupancy occupancy;
+  Opacity opacity;
   Aggregate aggregate;
   std::optional<Texels> texels;  // of textured scenes: made for the first of them
   Gather gather;
@@ -212,6 +217,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> grad_texcoords;         // [texcoord]
   Buffer<float> material_channels;          // [channel][face] in the order of the materials
   Buffer<cl_float4> grad_materials;         // [material] of backward_on_device(), as Geometry's
+  Buffer<cl_float4> grad_opacities;         // [opacity] in the first component
   Buffer<float> grad_numbers;               // as GradientMap has them
   std::uint64_t device_gradient_frame = 0;  // the frame of backward_on_device()
   std::optional<GradientMap> gradient_map;  // of the scene and views as they are
@@ -258,6 +264,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void forward_measured(bool is_whole = false);
   void settle();
   void render_again(bool is_whole = false);
+  void follow_opacities();
+  /// True if what lies behind the last frame's surfaces has a part in it.
+  bool sees_through() const { return is_see_through || opacity.is_bounded(); }
   /// Bands of samples of the next frame; none where the budget holds all of them.
   std::vector<Range> cut_samples() const;
   std::size_t sample_bytes() const;
@@ -287,7 +296,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void join_material_gradients();
 
   std::size_t found_emptied_ = 0;
-  cl_uint seen_layers_ = 1;                                // through which the last frame's contours are seen
+  bool follows_opacities_ = false;  // while a frame is rendered again for tangents along them
+  cl_uint seen_layers_ = 1;         // through which the last frame's contours are seen
   Buffer<float> own_samples_, own_pixels_, own_tangents_;  // of the caller's shading, packed
   Buffer<cl_float4> own_group_, own_image_, grad_group_;   // four of their channels
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()

@@ -9,6 +9,7 @@
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 #include "scene/scene_parts.hpp"
+#include "scene/see_through.hpp"
 #include "smoothing/priors.hpp"
 
 namespace dpr {
@@ -104,6 +105,7 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.color_faces = to_uint(geometry.color_faces);
   p.normal_faces = to_uint(geometry.normal_faces);
   p.texcoord_faces = to_uint(geometry.texcoord_faces);
+  p.opacity_faces = to_uint(geometry.opacity_faces);
   p.texels = to_uint(geometry.textures.texels);
   p.levels = geometry.textures.has_pyramids() ? 2 : 1;
   return p;
@@ -167,6 +169,8 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
 
   std::swap(scene, new_scene);
+  is_see_through = dpr::is_see_through(scene);
+  has_device_opacities = false;
   geometry = std::move(new_geometry);
   shade.set(std::move(lighting));
   set(spare_views_);

@@ -9,14 +9,15 @@
 #include "renderer/tangents.hpp"
 #include "scene/lens.hpp"
 #include "scene/projection_slopes.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 
 bool has_tangent(const GradientRow& row) {
   using Request = GradientRequest;
-  constexpr std::array k_known{&Request::positions, &Request::colors,     &Request::transform,
-                               &Request::camera,    &Request::distortion, &Request::smoothing,
-                               &Request::background};
+  constexpr std::array k_known{&Request::positions,  &Request::colors,     &Request::transform,
+                               &Request::camera,     &Request::distortion, &Request::smoothing,
+                               &Request::background, &Request::opacities};
   return std::ranges::find(k_known, row.wanted) != k_known.end();
 }
 
@@ -52,6 +53,9 @@ void validate(const SceneTangent& direction, const Scene& scene, std::size_t vie
     require_length(mesh.positions.size(), owns && frame.position_stride == 0 ? range.vertices : 0,
                    name + "positions");
     require_length(mesh.colors.size(), owns && frame.color_stride == 0 ? range.colors : 0, name + "colors");
+    const Mesh& own = scene.meshes[m].mesh;
+    require_length(mesh.opacities.size(), own.vertex_opacities.size() + own.face_opacities.size(),
+                   name + "opacities");
   }
   for (const ViewGradient& view : direction.views)
     require_length(view.transforms.size(), scene.meshes.size(), "transforms");
@@ -66,6 +70,10 @@ void validate(const SceneTangent& direction, const Scene& scene, std::size_t vie
       return number;
     });
   });
+}
+
+bool moves_opacities(const SceneTangent& direction) {
+  return std::ranges::any_of(direction.meshes, [](const MeshGradient& m) { return !m.opacities.empty(); });
 }
 
 cl_float4 float4_of(const dvec3& v) { return to_cl(glm::vec3(v)); }
@@ -93,22 +101,24 @@ shared::ViewTangent view_tangent(const CameraGradient& by, const Camera& camera,
   return t;
 }
 
-/// Arrays of meshes, or those of views' own shapes, one direction after the other; none if none moves.
+/// Arrays of meshes, or those of views' own shapes if there are any, one direction after the other; none if none
+/// moves.
 /// `first` says where a mesh's begin.
+template <class Element>
 std::vector<cl_float4> joined(std::span<const SceneTangent> directions, std::size_t count,
-                              std::vector<glm::vec3> MeshGradient::*of_mesh,
+                              std::vector<Element> MeshGradient::*of_mesh,
                               std::vector<glm::vec3> ShapesGradient::*of_shapes, const Geometry& geometry,
                               std::size_t MeshRange::*first) {
   const bool any = std::ranges::any_of(directions, [&](const SceneTangent& d) {
-    return !(d.shapes.*of_shapes).empty() ||
+    return (of_shapes && !(d.shapes.*of_shapes).empty()) ||
            std::ranges::any_of(d.meshes, [&](const MeshGradient& m) { return !(m.*of_mesh).empty(); });
   });
   std::vector<cl_float4> values(any ? directions.size() * count : 0);
   for (std::size_t d = 0; any && d < directions.size(); ++d) {
-    const auto copy = [&](const std::vector<glm::vec3>& from, std::size_t begin) {
-      for (std::size_t i = 0; i < from.size(); ++i) values[d * count + begin + i] = to_cl(from[i]);
+    const auto copy = [&](const auto& from, std::size_t begin) {
+      for (std::size_t i = 0; i < from.size(); ++i) values[d * count + begin + i] = to_cl(to_vec3(from[i]));
     };
-    copy(directions[d].shapes.*of_shapes, 0);
+    if (of_shapes) copy(directions[d].shapes.*of_shapes, 0);
     for (std::size_t m = 0; m < directions[d].meshes.size(); ++m)
       copy(directions[d].meshes[m].*of_mesh, geometry.meshes[m].*first);
   }
@@ -154,6 +164,9 @@ void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions)
   tangents.params.colors = upload(joined(directions, colorings * geometry->colors, &MeshGradient::colors,
                                          &ShapesGradient::colors, *geometry, &MeshRange::first_color),
                                   tangents.colors);
+  upload(joined(directions, geometry->opacities.values.size(), &MeshGradient::opacities, nullptr, *geometry,
+                &MeshRange::first_opacity),
+         tangents.opacities);
 }
 
 void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) const {
@@ -168,6 +181,7 @@ void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) 
       throw InvalidArgument("camera (tangent)", "a lit scene, with view matrices from a buffer",
                             "Renderer::set_views(): the eye's part of it needs their inverses");
     }
+    if (moves_opacities(direction)) require_sees_through(scene.smoothing);
     if (pixel_noise && direction.sigma != 0)
       throw InvalidArgument("sigma (tangent)", checks::text(direction.sigma), "0 with noise on the pixel");
   }
@@ -216,6 +230,7 @@ void Renderer::Impl::move_in_groups(std::span<const SceneTangent> directions,
 
 void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   require_whole();
+  if (std::ranges::any_of(directions, moves_opacities)) follow_opacities();
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(impl_of(device), directions.size() * image().size());
   cut_for_tangents(tangents_together(directions.size()));
@@ -228,6 +243,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
       if (bands.size() > 1) render(band);
       rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
       occupancy.tangent(frame, rasterize, tangents);
+      if (sees_through()) opacity.tangent(frame, *geometry, bin, rasterize, tangents);
       shade.tangent(shade_inputs(), tangents);
       aggregate.tangent(aggregate_inputs(), scene.background, tangents, pixel_noise ? 0 : first,
                         pixel_noise ? tangents.rasters : tangents.images);

@@ -25,7 +25,8 @@ constexpr std::array k_gradient_names{
     GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
     GradientName{"background", &Request::background}, GradientName{"texture", &Request::texture},
     GradientName{"texcoords", &Request::texcoords},   GradientName{"distortion", &Request::distortion},
-    GradientName{"normals", &Request::normals},       GradientName{"materials", &Request::materials}};
+    GradientName{"normals", &Request::normals},       GradientName{"materials", &Request::materials},
+    GradientName{"opacities", &Request::opacities}};
 
 bool has_field_of_view(const Scene& scene) {
   return !scene.camera.intrinsics && !scene.camera.orthographic_height;
@@ -83,6 +84,7 @@ std::vector<GradientRow> make_rows() {
       GradientRow{&Request::normals, Of::mesh, "meshes[].normals", of_mesh<&MeshGradient::normals>},
       GradientRow{&Request::materials, Of::mesh, "meshes[].specular", of_mesh<&MeshGradient::specular>},
       GradientRow{&Request::materials, Of::mesh, "meshes[].shininess", of_mesh<&MeshGradient::shininess>},
+      GradientRow{&Request::opacities, Of::mesh, "meshes[].opacities", of_mesh<&MeshGradient::opacities>},
       GradientRow{&Request::positions, Of::all_views, "shapes.positions",
                   [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
       GradientRow{&Request::colors, Of::all_views, "shapes.colors",

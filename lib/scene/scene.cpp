@@ -6,6 +6,7 @@
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
 #include "scene/scene_parts.hpp"
+#include "scene/see_through.hpp"
 
 namespace dpr {
 namespace {
@@ -67,6 +68,7 @@ void validate(const Scene& scene) {
   }
   if (scene.lights) validate(*scene.lights);
   validate(scene.smoothing);
+  if (is_see_through(scene)) require_sees_through(scene.smoothing);
 }
 
 }  // namespace dpr

@@ -75,6 +75,12 @@ void take_colors(const JsonNode& node, Mesh& mesh) {
   }
 }
 
+std::vector<float> numbers_of(const JsonNode& node) {
+  std::vector<float> list;
+  for (const JsonNode& element : node.elements()) list.push_back(element.number());
+  return list;
+}
+
 // A texture beside a file takes the place of all of the file's.
 void take_texture(const JsonNode& node, const std::filesystem::path& folder, Mesh& mesh) {
   if (node.find("texcoords").has_value() != node.find("face_texcoords").has_value())
@@ -128,7 +134,8 @@ Instance parse_place(const JsonNode& node) {
 Instance parse_instance(const JsonNode& node, const std::filesystem::path& folder, Notes& notes) {
   if (node.find("instance_of")) return parse_place(node);
   node.require_keys({"file", "positions", "faces", "transform", "vertex_colors", "face_colors", "texcoords",
-                     "face_texcoords", "texture", "normals", "face_normals", "material", "instance_of"});
+                     "face_texcoords", "texture", "normals", "face_normals", "material", "instance_of",
+                     "vertex_opacities", "face_opacities"});
   Instance instance;
   const auto file = node.find("file");
   if (file && (node.find("positions") || node.find("faces"))) {
@@ -146,6 +153,8 @@ Instance parse_instance(const JsonNode& node, const std::filesystem::path& folde
   take_texture(node, folder, instance.mesh);
   take_normals(node, instance.mesh);
   take_material(node, instance.mesh);
+  take(node, "vertex_opacities", instance.mesh.vertex_opacities, numbers_of);
+  take(node, "face_opacities", instance.mesh.face_opacities, numbers_of);
   take(node, "transform", instance.transform, [](const JsonNode& n) { return n.mat4(); });
   return instance;
 }

@@ -14,6 +14,7 @@
 #include "base/checks.hpp"
 #include "dpr/renderer.hpp"
 #include "mesh/bounding_box.hpp"
+#include "mesh/opacity.hpp"
 #include "renderer/frame.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/normal_equations.hpp"
@@ -28,6 +29,7 @@ const Mesh& template_of(const ShapeViews& views) {
   if (!views.initial)
     throw InvalidArgument("initial mesh (photographs)", "none", "a template, or a camera in every view");
   validate(*views.initial, "initial (photographs)");
+  require_opaque(*views.initial, "initial mesh");
   return *views.initial;
 }
 

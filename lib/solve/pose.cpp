@@ -10,6 +10,7 @@
 #include "base/checks.hpp"
 #include "base/clock.hpp"
 #include "dpr/error.hpp"
+#include "scene/see_through.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_body.hpp"
 #include "solve/pose_descent.hpp"
@@ -64,6 +65,7 @@ PoseSolver::PoseSolver(Device device, Scene scene, const Image& target, PoseOpti
     : device_(std::move(device)), scene_(std::move(scene)), target_(target), options_(std::move(options)) {
   validate_meshes(scene_, options_.meshes);
   validate(scene_);
+  require_opaque(scene_, "pose");
   const auto* least_squares = std::get_if<LeastSquares>(&options_.method);
   if (!target_.pixels.empty() || least_squares == nullptr || !has_observations(*least_squares) ||
       least_squares->unknown_background) {

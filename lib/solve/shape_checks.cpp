@@ -7,6 +7,7 @@
 
 #include "base/checks.hpp"
 #include "loss/image_loss_impl.hpp"
+#include "mesh/opacity.hpp"
 #include "solve/measured_images.hpp"
 #include "solve/shape_space.hpp"
 
@@ -39,6 +40,7 @@ void check_shape_views(const ShapeViews& views) {
   require_known_cameras(views, "shape");
   checks::require_finite(views.background, "background (shape)");
   if (views.initial) validate(*views.initial, "initial (shape)");
+  if (views.initial) require_opaque(*views.initial, "initial mesh");
   if (views.lights) validate(*views.lights);
   if (views.smoothing) validate(*views.smoothing);
 }

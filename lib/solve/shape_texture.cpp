@@ -6,6 +6,7 @@
 
 #include "dpr/multi_device.hpp"
 #include "dpr/shape.hpp"
+#include "mesh/opacity.hpp"
 #include "mesh/texture_atlas.hpp"
 #include "solve/shape_checks.hpp"
 #include "solve/shape_level.hpp"
@@ -108,6 +109,7 @@ Mesh find_texture(std::vector<Device> devices, const ShapeViews& all, const Mesh
   MultiDeviceRenderer renderer(std::move(devices));
   check_shape_views(all);
   validate(mesh, "mesh (texture)");
+  require_opaque(mesh, "mesh to texture");
   ShapeViews views = all;
   std::ranges::transform(all.views, views.views.begin(), without_border);
   ShapeOptions options;

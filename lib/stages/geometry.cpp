@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "mesh/opacity.hpp"
+
 namespace dpr {
 namespace {
 
@@ -35,15 +37,23 @@ std::vector<glm::vec3> mesh_colors(const Mesh& mesh) {
 
 std::size_t material_count(const Mesh& mesh) { return std::max<std::size_t>(mesh.materials.size(), 1); }
 
-cl_uint4 corner_colors(const Mesh& mesh, std::size_t face, std::size_t first_color,
-                       std::size_t first_material) {
-  const cl_uint base = to_uint(first_color), material = to_uint(first_material + material_of(mesh, face));
-  if (!mesh.vertex_colors.empty()) {
+/// The opacities of a mesh: per vertex, per face, or one.
+std::vector<float> mesh_opacities(const Mesh& mesh) {
+  if (!mesh.vertex_opacities.empty()) return mesh.vertex_opacities;
+  if (!mesh.face_opacities.empty()) return mesh.face_opacities;
+  return {1.0F};
+}
+
+/// Where a face's corners look in a list that is one of the vertices, of the faces, or has one element.
+cl_uint4 corner_elements(const Mesh& mesh, std::size_t face, std::size_t first, bool of_vertices,
+                         bool of_faces, cl_uint w) {
+  const cl_uint base = to_uint(first);
+  if (of_vertices) {
     const glm::uvec3& f = mesh.faces[face];
-    return {{base + f.x, base + f.y, base + f.z, material}};
+    return {{base + f.x, base + f.y, base + f.z, w}};
   }
-  const cl_uint color = mesh.face_colors.empty() ? base : to_uint(first_color + face);
-  return {{color, color, color, material}};
+  const cl_uint element = of_faces ? to_uint(first + face) : base;
+  return {{element, element, element, w}};
 }
 
 cl_uint4 corner_texcoords(const Mesh& mesh, std::size_t face, cl_uint first_texcoord, cl_uint first_texture) {
@@ -149,6 +159,8 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   add_colors(device, scene, all_faces);
   if (is_textured(scene)) add_textures(device, scene, all_faces);
   if (gives_normals(scene)) add_normals(device, scene, all_faces);
+  if (std::ranges::any_of(scene.meshes, has_opacities, &Instance::mesh))
+    add_opacities(device, scene, all_faces);
   face_vertices.upload(device, all_faces);
   add_materials(device, scene);
   add_places(device, scene);
@@ -190,7 +202,9 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<
       meshes[m].colors = all_colors.size() - meshes[m].first_color;
     }
     for (std::size_t face = 0; face < mesh.faces.size() && !by_vertex; ++face)
-      all_faces.push_back(corner_colors(mesh, face, source.first_color, source.first_material));
+      all_faces.push_back(corner_elements(mesh, face, source.first_color, !mesh.vertex_colors.empty(),
+                                          !mesh.face_colors.empty(),
+                                          to_uint(source.first_material + material_of(mesh, face))));
   }
   colors = all_colors.size();
   color_values.upload(device, all_colors);
@@ -259,6 +273,24 @@ void Geometry::add_normals(Device::Impl& device, const Scene& scene, std::vector
   given_normals.corners = make_incidence(device, std::span(all_faces).subspan(normal_faces), normals());
 }
 
+void Geometry::add_opacities(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces) {
+  std::vector<cl_float4> values;
+  opacity_faces = all_faces.size();
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const Mesh& mesh = mesh_of(scene, m);
+    if (!scene.meshes[m].instance_of) {
+      meshes[m].first_opacity = values.size();
+      for (const float opacity : mesh_opacities(mesh)) values.push_back(to_cl(glm::vec3(opacity, 0, 0)));
+    }
+    const std::size_t first = meshes[scene.meshes[m].instance_of.value_or(m)].first_opacity;
+    for (std::size_t face = 0; face < mesh.faces.size(); ++face)
+      all_faces.push_back(corner_elements(mesh, face, first, !mesh.vertex_opacities.empty(),
+                                          !mesh.face_opacities.empty(), 0));
+  }
+  opacities.values.upload(device, values);
+  opacities.corners = make_incidence(device, std::span(all_faces).subspan(opacity_faces), values.size());
+}
+
 void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
   std::vector<cl_float4> values;
   for (const Instance& instance : scene.meshes) {
@@ -291,6 +323,10 @@ std::size_t SurfaceMaterials::bytes() const {
   return values.capacity_bytes() + faces.capacity_bytes() + starts.capacity_bytes();
 }
 
+std::size_t Opacities::bytes() const {
+  return values.capacity_bytes() + corners.starts.capacity_bytes() + corners.corners.capacity_bytes();
+}
+
 std::size_t Textures::bytes() const {
   return texcoord_values.capacity_bytes() + textures.capacity_bytes() + texel_values.capacity_bytes() +
          texcoord_corners.starts.capacity_bytes() + texcoord_corners.corners.capacity_bytes();
@@ -300,7 +336,7 @@ std::size_t Geometry::bytes() const {
   std::size_t bytes = positions.capacity_bytes() + places.capacity_bytes() + vertex_mesh.capacity_bytes() +
                       face_vertices.capacity_bytes() + color_values.capacity_bytes() +
                       view_positions.capacity_bytes() + view_colors.capacity_bytes() + textures.bytes() +
-                      given_normals.bytes() + materials.bytes();
+                      given_normals.bytes() + materials.bytes() + opacities.bytes();
   for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
     bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
   }

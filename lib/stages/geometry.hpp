@@ -27,6 +27,7 @@ struct MeshRange {
   std::size_t first_texture = 0;
   std::size_t first_normal = 0, normals = 0;  // of meshes that give some: their values
   std::size_t first_material = 0, materials = 1;
+  std::size_t first_opacity = 0;
 };
 
 /// The textures of all meshes, and where faces look into them. Empty where no mesh has any.
@@ -70,6 +71,15 @@ struct SurfaceMaterials {
   std::size_t bytes() const;
 };
 
+/// The opacities of all meshes, one of each mesh without, and where corners look into them. Empty where no mesh has
+/// any.
+struct Opacities {
+  Buffer<cl_float4> values;  ///< [opacity] in the first component
+  Incidence corners;
+
+  std::size_t bytes() const;
+};
+
 struct Geometry {
   Geometry(Device::Impl& device, const Scene& scene);
 
@@ -81,15 +91,16 @@ struct Geometry {
   Buffer<cl_uint> vertex_mesh;       ///< [vertex]
   /// [face] vertex indices; w = mesh. Then, where they are others, and each from its place on: indices of the
   /// corners' colours, w = material; of their texture coordinates, w = texture or DPR_NO_TEXTURE; of their
-  /// normals: a vertex, or the number of vertices + a given one.
+  /// normals: a vertex, or the number of vertices + a given one; of their opacities.
   Buffer<cl_uint4> face_vertices;
-  std::size_t color_faces = 0, texcoord_faces = 0, normal_faces = 0;
+  std::size_t color_faces = 0, texcoord_faces = 0, normal_faces = 0, opacity_faces = 0;
   Buffer<cl_float4> color_values;                 ///< [color]
   Buffer<cl_float4> view_positions, view_colors;  ///< [view][position], [view][color]: of views' own
   Incidence vertex_corners;
   Textures textures;
   GivenNormals given_normals;
   SurfaceMaterials materials;
+  Opacities opacities;
 
   const Incidence& normal_corners() const {
     return given_normals.empty() ? vertex_corners : given_normals.corners;
@@ -115,6 +126,7 @@ struct Geometry {
   void add_colors(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
   void add_textures(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
   void add_normals(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
+  void add_opacities(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces);
   void add_materials(Device::Impl& device, const Scene& scene);
 
   Incidence color_corners_;  // where colours are not numbered as the vertices are

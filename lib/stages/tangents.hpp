@@ -14,6 +14,7 @@ struct Tangents {
   Buffer<shared::ModelTangent> models;  ///< [direction][view][mesh]
   Buffer<shared::FrameTangent> frames;  ///< [direction]
   Buffer<cl_float4> positions, colors;  ///< [direction][position], [color]; of views' own by view
+  Buffer<cl_float4> opacities;          ///< [direction][opacity]; empty: none changes
 
   Buffer<cl_float4> ndc;       ///< [direction][view][vertex] x, y, view depth
   Buffer<cl_float4> world;     ///< [direction][as Transform::world, then eyes], of lit scenes
@@ -27,9 +28,10 @@ struct Tangents {
 
   std::size_t bytes() const {
     return views.capacity_bytes() + models.capacity_bytes() + frames.capacity_bytes() +
-           positions.capacity_bytes() + colors.capacity_bytes() + ndc.capacity_bytes() +
-           world.capacity_bytes() + clip.capacity_bytes() + outlines.capacity_bytes() +
-           fragments.capacity_bytes() + shares.capacity_bytes() + rasters.capacity_bytes() + images.capacity_bytes();
+           positions.capacity_bytes() + colors.capacity_bytes() + opacities.capacity_bytes() +
+           ndc.capacity_bytes() + world.capacity_bytes() + clip.capacity_bytes() + outlines.capacity_bytes() +
+           fragments.capacity_bytes() + shares.capacity_bytes() + rasters.capacity_bytes() +
+           images.capacity_bytes();
   }
 };
 

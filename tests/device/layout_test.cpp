@@ -57,6 +57,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(FrameParams, color_faces),
           DPR_FIELD(FrameParams, normal_faces),
           DPR_FIELD(FrameParams, texcoord_faces),
+          DPR_FIELD(FrameParams, opacity_faces),
           DPR_FIELD(FrameParams, texels),
           DPR_FIELD(FrameParams, levels),
           DPR_FIELD(FrameParams, has_base),

@@ -68,6 +68,13 @@ std::size_t check_gradients(const Caller& caller, Renderer& renderer, SceneGradi
   return checked;
 }
 
+/// Every other number, from the third on.
+std::vector<float> laid_out_numbers(const std::vector<float>& numbers) {
+  std::vector<float> all(2);
+  for (const float number : numbers) all.insert(all.end(), {number, -7.0F});
+  return all;
+}
+
 /// The scene with other positions, so that what does not come from the buffers shows.
 Scene spoiled(Scene scene) {
   for (Instance& instance : scene.meshes) {
@@ -76,6 +83,7 @@ Scene spoiled(Scene scene) {
     for (glm::vec3& c : instance.mesh.face_colors) c *= 0.5F;
     for (glm::vec3& n : instance.mesh.normals) n.x += 0.4F;
     for (Material& m : instance.mesh.materials) m = {};
+    for (float& o : instance.mesh.face_opacities) o = 1;
     instance.transform[3].x += 0.1F;
   }
   if (!scene.lights) scene.camera.view[3].z -= 0.3F;
@@ -109,6 +117,8 @@ void set_from_buffers(const Caller& caller, Renderer& renderer, const Scene& sce
       materials.insert(materials.end(), {s.x, s.y, s.z, material.shininess.value_or(-0.5F), 0});
     }
     if (!materials.empty()) set_materials(renderer, m, {caller.buffer(materials)(), 0, 5 * sizeof(float)});
+    const std::vector<float>& opacities = mesh.face_opacities;
+    if (!opacities.empty()) set_opacities(renderer, m, {caller.buffer(laid_out_numbers(opacities))(), 8, 8});
     const std::vector<float> rows = rows_of(meshes[m].transform);
     transforms.insert(transforms.end(), rows.begin(), rows.end());
   }
@@ -135,6 +145,8 @@ std::vector<Scene> scenes() {
                     {glm::vec3(0.4F), std::nullopt}};
   soup.face_materials = {1, 0, 0, 1, 0};
   normals.gradients.materials = true;
+  two.meshes[1].mesh.face_opacities = {0.3F, 0.5F, 0.7F, 0.9F, 1.0F};
+  two.gradients.opacities = true;
   std::vector<Scene> all{test_scene(), sampled_scene(), sampled_joint_scene(), joint_scene(), texture,
                          two,          normals};
   for (Scene& scene : all) scene.gradients.camera = scene.gradients.transform = true;
