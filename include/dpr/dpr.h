@@ -162,12 +162,14 @@ typedef struct dpr_mesh {
   const dpr_material* materials; /* [material_count], or NULL */
   size_t material_count;
   const uint32_t* face_materials; /* [face], indices of materials; NULL: all the first */
+  const float* vertex_opacities;  /* [vertex], from 0 to 1, or NULL */
+  const float* face_opacities;    /* [face], or NULL; at most one of the two */
 } dpr_mesh;
 
 #define DPR_MESH_INIT                                                                                        \
   {                                                                                                          \
     sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, \
-        0, NULL                                                                                              \
+        0, NULL, NULL, NULL                                                                                  \
   }
 
 typedef enum dpr_shading {
@@ -227,15 +229,13 @@ DPR_API dpr_status dpr_scene_set_background(dpr_scene* scene, const float color[
 DPR_API dpr_status dpr_scene_set_cull(dpr_scene* scene, const char* word);
 /* NULL: no lights, colours as they are. */
 DPR_API dpr_status dpr_scene_set_lights(dpr_scene* scene, const dpr_lights* lights);
-/* Sets a member of "smoothing" in the scene format that is a word: "preset", "occupancy_prior", "estimator",
- * ... */
+/* Sets a member of "smoothing" in the scene format that is a word: "preset", "occupancy_prior", ... */
 DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* key, const char* word);
-/* The same for a number: "sigma", "gamma", "samples", "seed", ... Together they are checked when a renderer
- * takes the scene. */
+/* The same for a number: "sigma", "gamma", "samples", ... A renderer that takes the scene checks all. */
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
 /* Gradients that backward passes compute: "positions", "colors", "transform", "camera", "lights",
  * "smoothing", "background", "texture" (the texels), "texcoords", "distortion" (of lenses), "normals",
- * "materials". Without this call all but "lights" and the last five. */
+ * "materials", "opacities". Without this call all but "lights" and the last six. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -245,8 +245,7 @@ DPR_API dpr_status dpr_renderer_create(const dpr_device* device, dpr_renderer** 
 /* Checks and uploads the scene as it is now; its camera and transforms become the only view. */
 DPR_API dpr_status dpr_renderer_set_scene(dpr_renderer* renderer, const dpr_scene* scene);
 /* Replaces the views, all rendered by the same launches. cameras: [views]. transforms: [view][mesh][16],
- * object to world, `transform_count` floats; NULL and 0: where the scene has the meshes. Instances are meshes
- * here. */
+ * object to world, `transform_count` floats; NULL and 0: the scene's. Instances are meshes here. */
 DPR_API dpr_status dpr_renderer_set_views(dpr_renderer* renderer, const dpr_camera* cameras, size_t views,
                                           const float* transforms, size_t transform_count);
 /* New positions of a mesh, [vertex][3], `count` floats: as many as it has. */
@@ -267,6 +266,9 @@ DPR_API dpr_status dpr_renderer_set_normals(dpr_renderer* renderer, size_t mesh,
 /* New materials of a mesh that has some, `count` of them: as many as it has. */
 DPR_API dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, size_t mesh,
                                               const dpr_material* materials, size_t count);
+/* New opacities of a mesh that has some, [vertex] or [face], `count` floats: as many as it has. */
+DPR_API dpr_status dpr_renderer_set_opacities(dpr_renderer* renderer, size_t mesh, const float* opacities,
+                                              size_t count);
 /* Gives every view a shape of its own: [view][vertex][3] and [view][color][3], each of all meshes one after
  * the other without instances, so many floats. NULL and 0: the scene's. */
 DPR_API dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions,

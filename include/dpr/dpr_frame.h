@@ -21,6 +21,8 @@
  *   materials.specular   [M, 3]               1 without
  *   materials.shininess  [M]                  those of the lights without
  *   face_materials       [F]                  whole numbers; all have the first without
+ *   opacities            [V]                  from 0 to 1
+ *   or face_opacities    [F]                  opaque without either
  *   lights.ambient       [3]                  0.5 without
  *   lights.harmonics     [9, 3]
  *   lights.point         [L, 9]               position, diffuse, specular

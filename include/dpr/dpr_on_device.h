@@ -63,6 +63,9 @@ DPR_API dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, size_t 
 /* Four floats: `specular`, and `shininess`; one below 1 is the lights'. */
 DPR_API dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, size_t mesh,
                                                    const dpr_buffer* materials, const dpr_events* events);
+/* From 0 to 1, which is not checked; noise on the pixel refuses them whatever they are. */
+DPR_API dpr_status dpr_renderer_set_opacities_from(dpr_renderer* renderer, size_t mesh,
+                                                   const dpr_buffer* opacities, const dpr_events* events);
 /* As dpr_renderer_set_shapes(); one that is NULL is the scene's. */
 DPR_API dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
                                                 const dpr_buffer* colors, const dpr_events* events);

@@ -50,6 +50,13 @@ void upload_settings(Renderer& renderer, std::span<const View> views, const std:
   }
 }
 
+/// Opacities of the last batch need not go with the next one's smoothing.
+void make_opaque(Renderer& renderer) {
+  const Mesh& mesh = renderer.scene().meshes[0].mesh;
+  const std::vector<float> ones(mesh.vertex_opacities.size() + mesh.face_opacities.size(), 1.0F);
+  if (!ones.empty()) renderer.set_opacities(0, ones);
+}
+
 /// The vectors of an array, [n][3] or [view][n][3], once for every view.
 std::vector<glm::vec3> repeated(std::span<const glm::vec3> vectors, bool is_own, std::size_t views) {
   std::vector<glm::vec3> all;
@@ -64,6 +71,7 @@ GradientRequest request_of_attribute(std::span<const std::string> names, Attribu
   GradientRequest request = request_of(names, false);
   request.texcoords = request.texcoords && attribute == Attribute::texcoords;
   request.colors = request.background = request.lights = request.texture = request.materials = false;
+  request.opacities = false;
   return request;
 }
 
@@ -119,6 +127,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
   const std::optional<Lights> lights = make_lights(arrays, options);
   const std::vector<View> views = make_views(arrays, settings);
   Renderer& renderer = frame_.renderer();
+  make_opaque(renderer);
   upload_settings(renderer, views, lights, settings.smoothing(), options.first_view);
   renderer.set_cull(settings.cull());
   renderer.set_layers(settings.layers());
@@ -142,6 +151,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
   std::span<const glm::vec3> shapes;
   if (own_shapes) shapes = needs_affine ? std::span<const glm::vec3>(vertices_) : vertices;
   renderer.set_shapes(shapes, own_colors ? colors : std::span<const glm::vec3>());
+  renderer.set_gradients(request_of(wanted_, needs_affine));
   renderer.forward();
 }
 

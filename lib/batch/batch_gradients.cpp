@@ -119,7 +119,9 @@ void require_tangent(const NamedArray& tangent, std::size_t directions, std::spa
   const auto is_known = [](const GradientRow* row) { return has_tangent(*row); };
   if (tangent.name != "views" && (rows.empty() || !std::ranges::all_of(rows, is_known)))
     fail("an array along which images have none",
-         "one of vertices, colors, face_colors, views, intrinsics, background, sigma, gamma and alpha");
+         "one of vertices, colors, face_colors, opacities, face_opacities, views, intrinsics, background, "
+         "sigma, "
+         "gamma and alpha");
   if (std::ranges::find(wanted, tangent.name) == wanted.end())
     fail("an array that was not named when it was rendered",
          "one of those in `gradients` of the frame's options");
@@ -183,6 +185,8 @@ SceneTangent Batch::resting(NamedArrays tangents) {
   if (find(tangents, "vertices") || (find(tangents, "views") && !renderer.scene().lights))
     make_room(m.frame.position_stride != 0, m.geometry->position_count, views, direction.meshes[0].positions,
               direction.shapes.positions);
+  if (const NamedArray* const opacities = find_opacities(tangents))
+    direction.meshes[0].opacities.resize(opacities->shape.back());
   if (find_colors(tangents))
     make_room(m.frame.color_stride != 0, m.geometry->colors, views, direction.meshes[0].colors,
               direction.shapes.colors);

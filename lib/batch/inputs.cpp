@@ -99,6 +99,14 @@ std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings&
   return forms;
 }
 
+/// The number of opacities of that name; 0 without.
+std::size_t count_opacities(NamedArrays arrays, std::string_view name, std::size_t count) {
+  const NamedArray* const opacities = find(arrays, name);
+  if (!opacities) return 0;
+  require_floats(*opacities, {count}, "[" + std::to_string(count) + "]");
+  return count;
+}
+
 /// Texture coordinates and what refers to them: of vertices, of corners, or by indices.
 void take_texcoords(NamedArrays arrays, const NamedArray& faces, std::size_t vertices, Surface& surface) {
   const NamedArray* const texcoords = find(arrays, "texcoords");
@@ -165,6 +173,8 @@ std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
                                       Path{"texcoords", "meshes[].texcoords"},
                                       Path{"materials.specular", "meshes[].specular"},
                                       Path{"materials.shininess", "meshes[].shininess"},
+                                      Path{"opacities", "meshes[].opacities"},
+                                      Path{"face_opacities", "meshes[].opacities"},
                                       Path{"intrinsics", "camera.intrinsics."},
                                       Path{"intrinsics", "camera.distortion."},
                                       Path{"intrinsics", "camera.fisheye."},
@@ -188,6 +198,11 @@ std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
 const NamedArray* find_colors(NamedArrays arrays) {
   const NamedArray* const colors = find(arrays, "colors");
   return colors ? colors : find(arrays, "face_colors");
+}
+
+const NamedArray* find_opacities(NamedArrays arrays) {
+  const NamedArray* const opacities = find(arrays, "opacities");
+  return opacities ? opacities : find(arrays, "face_opacities");
 }
 
 BatchSizes check_sizes(NamedArrays arrays) {
@@ -297,6 +312,10 @@ Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::si
                           has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
   }
   surface.materials = count_materials(arrays);
+  surface.vertex_opacities = count_opacities(arrays, "opacities", vertices);
+  surface.face_opacities = count_opacities(arrays, "face_opacities", faces.shape[0]);
+  if (surface.vertex_opacities > 0 && surface.face_opacities > 0)
+    throw InvalidArgument("opacities (batch)", "opacities and face_opacities", "one of them");
   surface.face_textures = read_of_faces(arrays, "face_textures", faces.shape[0], -1);
   surface.face_materials = read_of_faces(arrays, "face_materials", faces.shape[0], 0);
   return surface;
@@ -326,6 +345,8 @@ void upload_surface(Renderer& renderer, NamedArrays arrays) {
     renderer.set_texcoords(0, require(arrays, "texcoords").rows<const glm::vec2>());
   for (std::size_t i = 0; i < mesh.textures.size(); ++i)
     renderer.set_texels(0, i, require(arrays, texture_name(i)).rows<const glm::vec3>());
+  if (const NamedArray* const opacities = find_opacities(arrays))
+    renderer.set_opacities(0, opacities->rows<const float>());
   if (mesh.materials.empty()) return;
   std::vector<Material> materials(mesh.materials.size());
   const NamedArray* const specular = find(arrays, "materials.specular");

@@ -30,6 +30,8 @@ Topology make_topology(NamedArrays arrays, const RenderSettings& settings);
 RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays);
 /// Vertices' or faces' colours; null: white.
 const NamedArray* find_colors(NamedArrays arrays);
+/// Those of the vertices or of the faces; none: null.
+const NamedArray* find_opacities(NamedArrays arrays);
 /// "textures[2]"
 std::string texture_name(std::size_t index);
 /// Rows of the gradients' table whose numbers are an array's gradient, but for those of views' matrices: of lights

@@ -33,6 +33,8 @@ bool has_surface(const Mesh& mesh, const Surface& surface) {
            texture.filter == form.filter;
   };
   return mesh.texcoords.size() == surface.texcoords && mesh.materials.size() == surface.materials &&
+         mesh.vertex_opacities.size() == surface.vertex_opacities &&
+         mesh.face_opacities.size() == surface.face_opacities &&
          std::ranges::equal(mesh.textures, surface.textures, has_form) &&
          mesh.face_texcoords == surface.face_texcoords && mesh.face_textures == surface.face_textures &&
          mesh.face_materials == surface.face_materials;
@@ -51,6 +53,8 @@ void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.face_textures = surface.face_textures;
   mesh.materials.resize(surface.materials);
   mesh.face_materials = surface.face_materials;
+  mesh.vertex_opacities.assign(surface.vertex_opacities, 1.0F);  // which suits every smoothing
+  mesh.face_opacities.assign(surface.face_opacities, 1.0F);
 }
 
 bool Topology::is_of(const Scene& scene) const {

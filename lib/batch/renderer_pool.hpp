@@ -29,9 +29,9 @@ struct TextureForm {
   bool operator==(const TextureForm&) const = default;
 };
 
-/// Textures and materials without their numbers, as a Mesh (dpr/mesh.hpp) has them; empty: neither.
+/// Textures, materials and opacities without their numbers, as a Mesh (dpr/mesh.hpp) has them; empty: none.
 struct Surface {
-  std::size_t texcoords = 0, materials = 0;  ///< how many there are
+  std::size_t texcoords = 0, materials = 0, vertex_opacities = 0, face_opacities = 0;  ///< how many there are
   Faces face_texcoords;
   std::vector<TextureForm> textures;
   std::vector<std::uint32_t> face_textures, face_materials;

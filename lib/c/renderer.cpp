@@ -40,6 +40,8 @@ dpr_status set_floats(dpr_renderer* renderer, const ArrayRef& at, const float* v
     const std::span<const float> floats = numbers(values, count, row.components, row.name);
     if (row.components == 2) {
       r.set_array(at, to_pairs(floats));
+    } else if (row.components == 1) {
+      r.set_array(at, floats);
     } else {
       r.set_array(at, to_vectors(floats));
     }
@@ -114,6 +116,11 @@ dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, std::size_t mesh, 
   });
 }
 
+dpr_status dpr_renderer_set_opacities(dpr_renderer* renderer, std::size_t mesh, const float* opacities,
+                                      std::size_t count) {
+  return set_floats(renderer, {dpr::ArrayId::opacities, mesh}, opacities, count);
+}
+
 dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* positions, const dpr_events* events) {
   return set_from(renderer, {dpr::ArrayId::positions, mesh}, positions, events);
@@ -142,6 +149,11 @@ dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, std::size_t mes
 dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* materials, const dpr_events* events) {
   return set_from(renderer, {dpr::ArrayId::materials, mesh}, materials, events);
+}
+
+dpr_status dpr_renderer_set_opacities_from(dpr_renderer* renderer, std::size_t mesh,
+                                           const dpr_buffer* opacities, const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::opacities, mesh}, opacities, events);
 }
 
 dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions, std::size_t position_count,

@@ -128,7 +128,7 @@ void copy_textures(const dpr_mesh& given, Mesh& mesh) {
     mesh.face_textures.assign(given.face_textures, given.face_textures + given.face_count);
 }
 
-/// Its normals and materials.
+/// Its normals, materials and opacities.
 void copy_reflection(const dpr_mesh& given, Mesh& mesh) {
   if (given.normals) {
     if (!given.face_normals)
@@ -140,6 +140,10 @@ void copy_reflection(const dpr_mesh& given, Mesh& mesh) {
   mesh.materials = to_materials(given.materials, given.material_count, "mesh.materials");
   if (given.face_materials)
     mesh.face_materials.assign(given.face_materials, given.face_materials + given.face_count);
+  if (given.vertex_opacities)
+    mesh.vertex_opacities.assign(given.vertex_opacities, given.vertex_opacities + given.vertices);
+  if (given.face_opacities)
+    mesh.face_opacities.assign(given.face_opacities, given.face_opacities + given.face_count);
 }
 
 }  // namespace

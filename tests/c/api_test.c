@@ -1051,12 +1051,13 @@ static int differs(const dpr_renderer* renderer, const float* image) {
   return memcmp(pixels, image, sizeof pixels) != 0;
 }
 
-/* A renderer's setters leave the state that a new scene would: normals, materials, lights and the rest. */
+/* A renderer's setters leave the state that a new scene would: normals, materials, opacities, lights and the rest. */
 static void test_setters(const dpr_device* device) {
   const float normals[] = {0, 0, 1}, turned[] = {0.3f, 0.2f, 1}, grey[] = {0.5f, 0.5f, 0.5f};
   const uint32_t first[] = {0, 0, 0}, beyond[] = {0, 1, 0}, of_face[] = {0};
   const dpr_material dull[] = {{{0.1f, 0.2f, 0.3f}, 3}}, bright[] = {{{1, 0.9f, 0.8f}, 0}};
-  const char* const wanted[] = {"normals", "materials"};
+  const float clear[] = {0.5f, 0.25f, 0.75f}, opaque[] = {1, 1, 1};
+  const char* const wanted[] = {"normals", "materials", "opacities"};
   const char* const others[] = {"positions"};
   const dpr_camera camera = three_units_away();
   dpr_point_light light = {{1, 2, 4}, {0.6f, 0.6f, 0.6f}, {0.5f, 0.5f, 0.5f}};
@@ -1074,10 +1075,11 @@ static void test_setters(const dpr_device* device) {
     mesh.face_normals = first;
     mesh.materials = is_new ? bright : dull, mesh.material_count = 1;
     mesh.face_materials = of_face;
+    mesh.vertex_opacities = is_new ? clear : opaque;
     OK(dpr_scene_create(SIDE, SIDE, &scene));
     OK(dpr_scene_add_mesh(scene, &mesh));
     OK(dpr_scene_set_camera(scene, &camera));
-    OK(dpr_scene_set_gradients(scene, wanted, 2));
+    OK(dpr_scene_set_gradients(scene, wanted, is_new ? 3 : 2)); /* noise on the pixel has none of opacities */
     OK(dpr_renderer_create(device, &renderers[is_new]));
     renderer = renderers[is_new];
     if (is_new) OK(dpr_scene_set_background(scene, grey));
@@ -1098,6 +1100,9 @@ static void test_setters(const dpr_device* device) {
       EXPECT(differs(renderer, image));
       OK(dpr_renderer_set_materials(renderer, 0, bright, 1));
       OK(dpr_renderer_forward(renderer));
+      EXPECT(differs(renderer, image));
+      OK(dpr_renderer_set_opacities(renderer, 0, clear, 3));
+      OK(dpr_renderer_forward(renderer));
       EXPECT(!differs(renderer, image));
       OK(dpr_renderer_set_lights(renderer, NULL));
       OK(dpr_renderer_forward(renderer));
@@ -1110,6 +1115,7 @@ static void test_setters(const dpr_device* device) {
     REFUSED(dpr_renderer_set_normals(renderer, 0, turned, 6), "expected 1");
     REFUSED(dpr_renderer_set_materials(renderer, 0, NULL, 1), "materials");
     REFUSED(dpr_renderer_set_materials(renderer, 0, bright, 0), "expected 1");
+    REFUSED(dpr_renderer_set_opacities(renderer, 0, clear, 2), "expected 3");
     REFUSED(dpr_renderer_set_smoothing(renderer, NULL), "scene");
     REFUSED(dpr_renderer_set_cull(renderer, "some"), "word");
     REFUSED(dpr_renderer_set_background(renderer, NULL), "color");
@@ -1118,6 +1124,8 @@ static void test_setters(const dpr_device* device) {
   renderer = renderers[1];
   OK(dpr_backward_pixels(renderer, image, FLOATS, &gradient));
   OK(dpr_gradient_size(gradient, "meshes[0].normals", &count));
+  EXPECT(count == 3);
+  OK(dpr_gradient_size(gradient, "meshes[0].opacities", &count));
   EXPECT(count == 3);
   OK(dpr_gradient_size(gradient, "meshes[0].specular", &count));
   dpr_gradient_destroy(gradient);

@@ -79,6 +79,35 @@ class NumpyTest(unittest.TestCase):
                           ("materials", "specular"), ("materials", "shininess")):
             self.check_gradient(f"{name}.{key}", of_entry(name, key), name, arguments)
 
+    def test_opacities(self):
+        views, intrinsics = cameras(2)
+        for name, count in (("opacities", len(SQUARE)), ("face_opacities", len(SQUARE_FACES))):
+            arguments = {"vertices": SQUARE, "faces": SQUARE_FACES, "views": views, "intrinsics": intrinsics,
+                         name: random(count, seed=4) * np.float32(0.8) + np.float32(0.1)}
+            direction = random(count, seed=7) - 0.5
+            self.check_gradient(name, lambda given, step, name=name, direction=direction: (
+                {**given, name: given[name] + np.float32(step) * direction}, lambda g: (g * direction).sum()), name,
+                arguments)
+            renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)
+            image, tangents = renderer.jvp(**arguments, tangents={name: direction[None]})
+            weights = random(*image.shape, seed=3)
+            gradient = renderer.vjp(**arguments, wrt=[name])[1](weights)[name]
+            self.assertAlmostEqual((tangents[0] * weights).sum() / (gradient * direction).sum(), 1, delta=1e-4)
+            opaque = {**arguments, name: np.ones(count, np.float32)}
+            np.testing.assert_array_equal(renderer(**opaque), renderer(**{**opaque, name: None}))
+            np.testing.assert_array_equal(dpr.render(**opaque, width=SIZE, height=SIZE, preset="pixel"),
+                                          dpr.render(**{**opaque, name: None}, width=SIZE, height=SIZE, preset="pixel"))
+            half = {**arguments, name: np.full(count, 0.5, np.float32)}
+            np.testing.assert_allclose(renderer(**half)[..., 3], renderer(**opaque)[..., 3] / 2, atol=0.3)
+            for wrong, words in (({"preset": "pixel"}, "joint_gaussian"), ({"outputs": ["depth"]}, "opacities")):
+                settings = {**SMOOTH, **wrong} if "preset" not in wrong else wrong
+                with self.assertRaisesRegex(ValueError, words):
+                    dpr.render(**arguments, width=SIZE, height=SIZE, **settings)
+            with self.assertRaisesRegex(ValueError, name):
+                renderer(**{**arguments, name: np.full(count + 1, 0.5, np.float32)})
+            with self.assertRaisesRegex(ValueError, "opacities.*expected a number from 0 to 1"):
+                renderer(**{**arguments, name: np.full(count, 1.5, np.float32)})
+
     def test_gradients_through_a_fisheye(self):
         views, intrinsics = cameras(2)
         rows = np.concatenate([intrinsics, np.tile(np.float32([0.3, -0.2, 0.1, -0.05]), (2, 1))], 1)

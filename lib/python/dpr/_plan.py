@@ -9,7 +9,7 @@ from . import _arrays, _library
 from ._arrays import fail
 from ._frames import OTHERS, WITH_GRADIENTS, Spec
 
-_FLOATS = ("vertices", "colors", "face_colors", "texcoords")
+_FLOATS = ("vertices", "colors", "face_colors", "opacities", "face_opacities", "texcoords")
 _INDICES = ("faces", "face_texcoords", "face_textures", "face_materials")
 _EUCLIDEAN = ("opendr", "nmr")
 """Presets with distances in NDC, not squared."""
@@ -224,8 +224,9 @@ def _lists_of_padded(meshes):
         of_texcoords = face_counts
     else:
         of_texcoords = vertex_counts if meshes["face_texcoords"] is None else [None] * len(faces)
-    counts = {"vertices": vertex_counts, "colors": vertex_counts, "texcoords": of_texcoords, **dict.fromkeys(
-        ("faces", "face_colors", "face_texcoords", "face_textures", "face_materials"), face_counts)}
+    counts = {"vertices": vertex_counts, "colors": vertex_counts, "opacities": vertex_counts, "texcoords": of_texcoords,
+              **dict.fromkeys(("faces", "face_colors", "face_opacities", "face_texcoords", "face_textures",
+                               "face_materials"), face_counts)}
     lists = dict(meshes)
     for name, of_meshes in counts.items():
         padded = meshes[name]

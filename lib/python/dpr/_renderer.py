@@ -92,11 +92,11 @@ class Renderer:
             ", ".join(f"{name}={value!r}" for name, value in self._settings.items()) + ")"
 
     def __call__(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *,
-                 colors: Optional[Meshes] = None, face_colors: Optional[Meshes] = None,
-                 texcoords: Optional[Meshes] = None, face_texcoords: Optional[Meshes] = None, textures: Any = None,
-                 face_textures: Optional[Meshes] = None, wrap: Union[str, Sequence[str]] = "repeat",
-                 filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None,
-                 face_materials: Optional[Meshes] = None, background: Optional[Array] = None,
+                 colors: Optional[Meshes] = None, face_colors: Optional[Meshes] = None, opacities: Optional[Meshes] = None,
+                 face_opacities: Optional[Meshes] = None, texcoords: Optional[Meshes] = None,
+                 face_texcoords: Optional[Meshes] = None, textures: Any = None, face_textures: Optional[Meshes] = None,
+                 wrap: Union[str, Sequence[str]] = "repeat", filter: Union[str, Sequence[str]] = "bilinear",
+                 materials: Any = None, face_materials: Optional[Meshes] = None, background: Optional[Array] = None,
                  lights: Optional[Dict[str, Array]] = None, sigma: Union[float, Array, None] = None,
                  blur: Union[float, Array, None] = None, gamma: Union[float, Array, None] = None,
                  alpha: Union[float, Array, None] = None, outputs: Iterable[str] = (), copy: bool = False,
@@ -113,6 +113,8 @@ class Renderer:
                      k4; [N, 1], orthographic: world units from the lower to the upper edge
         colors       [V, 3] or [N, V, 3], linear RGB of the vertices; or
         face_colors  [F, 3] or [N, F, 3], of the faces; white without either
+        opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1 they need
+                     noise of the triangles (the preset "joint_gaussian" say), and outputs with gradients are refused
         texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
         face_texcoords  [F, 3], int64 or int32: their indices
         textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by
@@ -120,8 +122,7 @@ class Renderer:
         face_textures   [F], int64 or int32: the faces' textures, -1 for none; all have the first unless given
         wrap         "repeat", "mirror" or "clamp", what lies beyond [0, 1]; a word, or a list of one a texture
         filter       "nearest", "bilinear" or "trilinear", which has a pyramid of smaller images; likewise
-        materials    a dictionary of what highlights are multiplied by and their exponents: "specular" [M, 3] (1 if left
-                     out), "shininess" [M] (the lights' if left out)
+        materials    a dictionary: "specular" [M, 3] (1 if left out) multiplies highlights, "shininess" [M] (or the lights')
         face_materials  [F], int64 or int32: the faces' materials; all have the first unless given
         background   [3], linear RGB; black unless given. A picture: image[..., :3] + (1 - image[..., 3:]) * picture
         lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
@@ -147,27 +148,26 @@ class Renderer:
 
         Returns the images [N, height, width, 4]: linear RGB over the background, which is not to be blended by alpha
         again, and alpha, the silhouette. With outputs, (images, {name: tensor}): depth [N, height, width] along the
-        view direction, world units; position and normal [N, height, width, 3], world space; texcoords
-        [N, height, width, 2]; all of these the mean by the faces' weights (the normal at length 1), 0 where these sum
-        to less than 1e-12. face_id [N, height, width], int64, of the face that weighs most, -1 on the background;
-        barycentrics [N, height, width, 3] and uv [N, height, width, 2] of that face; effective_faces, how many faces
-        share a pixel.
+        view direction, world units; position and normal [N, height, width, 3], world space; texcoords [N, height,
+        width, 2]; all of these the mean by the faces' weights (the normal at length 1), 0 where these sum to less than
+        1e-12. face_id [N, height, width], int64, of the face that weighs most, -1 on the background; barycentrics [N,
+        height, width, 3] and uv [N, height, width, 2] of that face; effective_faces, how many faces share a pixel.
 
         The images have first derivatives with respect to every float array above. Views may be any affine matrices, but
         with lights their derivatives are those of rigid motions. Depth, position, normal and texcoords have derivatives
-        with respect to vertices, views (rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, of what
-        is shown and of how much of it is seen; each costs about an image, normals four. The other outputs have none. Errors name the
-        argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes and of what arrays
-        hold, dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as those have them. A
-        UserWarning tells that every triangle was dropped, or some beyond the zfar that was set, but not from within
-        torch.compile.
+        with respect to vertices, views (rigid motions), intrinsics, sigma, gamma, alpha and texture coordinates, of
+        what is shown and of how much of it is seen; each costs about an image, normals four. The other outputs have
+        none. Errors name the argument: TypeError of what is no such array, ValueError (dpr.InvalidArgument) of shapes
+        and of what arrays hold, dpr.DeviceError of OpenCL; but from within torch.compile and JAX's jit they come as
+        those have them. A UserWarning tells that every triangle was dropped, or some beyond the zfar that was set, but
+        not from within torch.compile.
         """
         _plan.require_names(misspelt, _OF_A_CALL)
         spec, plan = self._plan(vertices, faces, views, intrinsics, {
-            "colors": colors, "face_colors": face_colors, "texcoords": texcoords, "face_texcoords": face_texcoords,
-            "textures": textures, "face_textures": face_textures, "wrap": wrap, "filter": filter, "materials": materials,
-            "face_materials": face_materials, "background": background, "lights": lights, "sigma": sigma, "blur": blur,
-            "gamma": gamma, "alpha": alpha, "outputs": outputs, "copy": copy})
+            "colors": colors, "face_colors": face_colors, "opacities": opacities, "face_opacities": face_opacities,
+            "texcoords": texcoords, "face_texcoords": face_texcoords, "textures": textures, "face_textures": face_textures,
+            "wrap": wrap, "filter": filter, "materials": materials, "face_materials": face_materials, "background": background,
+            "lights": lights, "sigma": sigma, "blur": blur, "gamma": gamma, "alpha": alpha, "outputs": outputs, "copy": copy})
         kinds = {_arrays.module_of(leaf) for leaf in plan.leaves}
         if "torch" in kinds:
             from . import _torch
@@ -189,10 +189,10 @@ class Renderer:
 
         Returns (result, tangents [K, N, height, width, 4]), exact, and the transpose of vjp(). Directions share most of
         the work: with the image, one costs up to three images, six up to five. Images have tangents along vertices,
-        colors, face_colors, views, intrinsics, background, sigma, blur, gamma and alpha; with noise on the pixel (the
-        preset "pixel") not along sigma and blur. Raises ValueError (dpr.InvalidArgument) for other arrays, Monte Carlo,
-        outputs with gradients, and other shapes. PyTorch and JAX take their own tangents by torch.func.jvp,
-        torch.autograd.forward_ad and jax.jvp.
+        colors, face_colors, opacities, face_opacities, views, intrinsics, background, sigma, blur, gamma and alpha;
+        with noise on the pixel (the preset "pixel") not along sigma and blur. Raises ValueError (dpr.InvalidArgument)
+        for other arrays, Monte Carlo, outputs with gradients, and other shapes. PyTorch and JAX take their own tangents
+        by torch.func.jvp, torch.autograd.forward_ad and jax.jvp.
 
             image, tangents = renderer.jvp(vertices, faces, views, intrinsics, tangents={"vertices": directions})
             matrix, vector = dpr.normal_equations(tangents, image - target)
