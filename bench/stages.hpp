@@ -12,9 +12,10 @@
 namespace dpr::bench {
 
 /// In the order of the pipeline; scan, sort, gather and reduce serve several others.
-inline constexpr std::string_view k_stages[] = {
-    "transform", "setup",     "clip",      "contour",   "bin",  "scan", "sort",   "rasterize", "surface",
-    "shade",     "occupancy", "aggregate", "antialias", "blur", "loss", "gather", "texels",    "reduce"};
+inline constexpr std::string_view k_stages[] = {"transform", "setup",   "clip",      "contour",   "bin",
+                                                "scan",      "sort",    "rasterize", "surface",   "shade",
+                                                "occupancy", "opacity", "aggregate", "antialias", "blur",
+                                                "loss",      "gather",  "texels",    "reduce"};
 
 /// The stage of a kernel file: "aggregate_joint.cl" belongs to "aggregate".
 inline std::string stage_of(std::string_view kernel_file) {
