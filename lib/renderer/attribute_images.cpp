@@ -191,11 +191,11 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
   Renderer::Impl& r = impl_of(renderer);
   r.has_moved = r.has_moved || r.frame.position_stride != 0;
   r.frame.position_stride = 0;
-  r.near_plane.set_boxes_of_views({});
+  r.clip_planes.set_boxes_of_views({});
   const bool by_corner = domain() == AttributeDomain::corners;
   bool all_are_known = true;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (!source.near_plane.knows(meshes_[m].instance_of.value_or(m))) {
+    if (!source.clip_planes.knows(meshes_[m].instance_of.value_or(m))) {
       r.forget_positions(m);
       all_are_known = false;
       continue;
@@ -204,7 +204,7 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
     const std::vector<glm::vec3> of_corners =
         by_corner ? positions_of_corners(mesh) : std::vector<glm::vec3>();
     const std::vector<glm::vec3>& positions = by_corner ? of_corners : mesh.positions;
-    if (!r.near_plane.knows(m) || r.scene.meshes[m].mesh.positions != positions)
+    if (!r.clip_planes.knows(m) || r.scene.meshes[m].mesh.positions != positions)
       renderer.set_positions(m, positions);
   }
   if (!all_are_known) rows_.move(positions_, 1, source.geometry->positions, 1, r.geometry->positions);
@@ -218,9 +218,9 @@ void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
   r.has_moved = true;
   std::vector<BoxCorners> boxes;
   for (std::size_t pass = 0; pass < passes(); ++pass)
-    std::ranges::copy(source.near_plane.boxes_of_views(), std::back_inserter(boxes));
-  r.near_plane.set_boxes_of_views(std::move(boxes));
-  if (!source.near_plane.knows_views()) r.near_plane.forget_views();
+    std::ranges::copy(source.clip_planes.boxes_of_views(), std::back_inserter(boxes));
+  r.clip_planes.set_boxes_of_views(std::move(boxes));
+  if (!source.clip_planes.knows_views()) r.clip_planes.forget_views();
 }
 
 void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {

@@ -43,14 +43,14 @@ float BackFaces::hidden_of(int winding, const BoxCorners& box, const Camera& cam
   return determinant * winding > 0 ? -1.0F : 1.0F;
 }
 
-std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
+std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, ClipPlanes& clip_planes,
                                      float depth_reach) const {
   std::vector<float> hidden;
   for (std::size_t v = 0; v < views.size(); ++v) {
     for (std::size_t m = 0; m < states_.size(); ++m) {
       const int winding = states_[scene.meshes[m].instance_of.value_or(m)].winding;
       hidden.push_back(winding == 0 ? 0.0F
-                                    : hidden_of(winding, near_plane.box_of(scene, v, m), views[v].camera,
+                                    : hidden_of(winding, clip_planes.box_of(scene, v, m), views[v].camera,
                                                 views[v].transforms[m], depth_reach));
     }
   }

@@ -7,7 +7,7 @@
 
 #include "dpr/renderer.hpp"
 #include "mesh/solid.hpp"
-#include "renderer/near_plane.hpp"
+#include "renderer/clip_planes.hpp"
 
 namespace dpr {
 
@@ -32,7 +32,7 @@ class BackFaces {
   /// (normalised) by which the noise of the depths shows what lies behind. Where a mesh passes through itself
   /// such that its inside is outside, its far side is seen there. Meshes that the device measures count as
   /// counter-clockwise.
-  std::vector<float> hidden(const Scene& scene, std::span<const View> views, NearPlane& near_plane,
+  std::vector<float> hidden(const Scene& scene, std::span<const View> views, ClipPlanes& clip_planes,
                             float depth_reach) const;
 
  private:

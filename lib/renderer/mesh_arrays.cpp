@@ -50,7 +50,7 @@ bool has_textures(const Mesh& mesh) { return !mesh.textures.empty(); }
 
 void move_positions(Impl& m, std::size_t mesh, bool on_host) {
   if (!on_host) return m.forget_positions(mesh);
-  m.near_plane.move(mesh);
+  m.clip_planes.move(mesh);
   m.has_moved = true;
   if (m.pixel_noise && m.pixel_noise->edges) m.pixel_noise->back_faces.move(mesh);
 }
@@ -333,7 +333,7 @@ void Renderer::Impl::replace(const ArrayRef& at, std::vector<Element>& held,
   std::swap(held, copy);
   if constexpr (std::is_same_v<Element, glm::vec3>) spare_vectors_ = std::move(copy);
   row.changed(*this, at.mesh, /*on_host*/ true);
-  if (has_box && !elements.empty()) near_plane.set_box(at.mesh, box_corners(box));
+  if (has_box && !elements.empty()) clip_planes.set_box(at.mesh, box_corners(box));
 }
 
 void Renderer::Impl::set(const ArrayRef& at, const ArrayValues& values) {

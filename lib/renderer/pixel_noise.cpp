@@ -192,7 +192,7 @@ void Renderer::Impl::find_edges() {
     pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
     setup.forget_volumes();
     for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {
-      if (!near_plane.knows(mesh)) pixel_noise->back_faces.forget(mesh);
+      if (!clip_planes.knows(mesh)) pixel_noise->back_faces.forget(mesh);
     }
     has_moved = true;
   }
@@ -216,7 +216,7 @@ void Renderer::Impl::hide_back_faces() {
     BackFaces& back_faces = pixel_noise->back_faces;
     back_faces.measure(scene, [&](std::size_t mesh) { setup.measure(*geometry, scene, mesh); });
     hides_by_device_ = back_faces.are_on_device();
-    hidden = back_faces.hidden(scene, views, near_plane, depth_reach(scene.smoothing));
+    hidden = back_faces.hidden(scene, views, clip_planes, depth_reach(scene.smoothing));
   }
   if (hidden == uploaded_hidden_) return;
   uploaded_hidden_.clear();

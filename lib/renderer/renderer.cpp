@@ -86,7 +86,7 @@ void Renderer::Impl::build_pyramids() {
 void Renderer::Impl::set_up() {
   opacity.set_bounds(scene.smoothing.composition, follows_opacities_ || wants(ArrayId::opacities));
   frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
-  frame.clips = has_device_poses || near_plane.may_be_crossed(scene, views) ? 1 : 0;
+  frame.clips = has_device_poses || clip_planes.may_be_crossed(scene, views) ? 1 : 0;
   if (pixel_noise) {
     set_edges(frame, *pixel_noise->edges, scene.lights ? std::optional(scene.lights->shading) : std::nullopt,
               depth_reach(scene.smoothing));

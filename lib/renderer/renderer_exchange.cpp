@@ -19,7 +19,7 @@ void Renderer::Impl::take(const ArrayRef& at, std::size_t count, const FloatVect
 }
 
 void Renderer::Impl::forget_positions(std::size_t mesh) noexcept {
-  near_plane.forget(mesh);
+  clip_planes.forget(mesh);
   has_moved = true;
   if (pixel_noise && pixel_noise->edges) pixel_noise->back_faces.forget(mesh);
 }
@@ -40,8 +40,8 @@ void Renderer::Impl::take_shapes(const std::optional<FloatVectors>& positions,
   std::swap(geometry->view_colors, spare_view_colors_);
   frame.position_stride = position_stride;
   frame.color_stride = color_stride;
-  near_plane.set_boxes_of_views({});
-  if (positions) near_plane.forget_views();
+  clip_planes.set_boxes_of_views({});
+  if (positions) clip_planes.forget_views();
   has_moved = true;
   rendered = false;
 }

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "dpr/renderer.hpp"
+#include "renderer/clip_planes.hpp"
 #include "renderer/gradient_map.hpp"
 #include "renderer/mesh_arrays.hpp"
-#include "renderer/near_plane.hpp"
 #include "renderer/pixel_noise.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/attribute.hpp"
@@ -189,7 +189,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   Transform transform;
   Setup setup;
-  NearPlane near_plane;
+  ClipPlanes clip_planes;
   Clip clip;  // of frames with faces that may cross the near plane or the far one
   Bin bin;
   Rasterize rasterize;

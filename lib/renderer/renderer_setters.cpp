@@ -17,7 +17,7 @@ namespace {
 
 // Without these the second half of a setter could fail.
 static_assert(std::is_nothrow_swappable_v<Scene> && std::is_nothrow_swappable_v<ViewSet> &&
-              std::is_nothrow_swappable_v<NearPlane>);
+              std::is_nothrow_swappable_v<ClipPlanes>);
 static_assert(std::is_nothrow_move_constructible_v<Geometry> && std::is_nothrow_move_assignable_v<Geometry>);
 
 /// A row of an affine matrix: linear part and translation.
@@ -159,7 +159,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   check_frame_size(wanted, 1, 0);
   Scene new_scene = wanted;
   Geometry new_geometry(impl_of(device), wanted);
-  NearPlane new_near_plane(wanted.meshes.size());
+  ClipPlanes new_clip_planes(wanted.meshes.size());
   if (is_textured(wanted)) {
     shade.make_surface();
     if (!texels) texels.emplace(impl_of(device));
@@ -175,7 +175,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   shade.set(std::move(lighting));
   set(spare_views_);
   set(std::move(smoothing));
-  std::swap(near_plane, new_near_plane);
+  std::swap(clip_planes, new_clip_planes);
   last_counts.reset();
   reserved.reset();
   if (pixel_noise) pixel_noise->edges.reset();
@@ -230,7 +230,7 @@ void Renderer::Impl::set(ViewSet& prepared) noexcept {
   has_moved = has_moved || prepared.frame.position_stride != frame.position_stride;
   gradient_map.reset();
   std::swap(static_cast<ViewSet&>(*this), prepared);
-  near_plane.set_boxes_of_views({});
+  clip_planes.set_boxes_of_views({});
   rendered = false;
 }
 
@@ -286,11 +286,11 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   spare_view_colors_.resize(impl_of(device), colors.size());
   write_range(impl_of(device), spare_view_positions_, 0, to_cl(positions));
   write_range(impl_of(device), spare_view_colors_, 0, to_cl(colors));
-  std::vector<BoxCorners> boxes = NearPlane::boxes_of(positions, *geometry);
+  std::vector<BoxCorners> boxes = ClipPlanes::boxes_of(positions, *geometry);
 
   std::swap(geometry->view_positions, spare_view_positions_);
   std::swap(geometry->view_colors, spare_view_colors_);
-  near_plane.set_boxes_of_views(std::move(boxes));
+  clip_planes.set_boxes_of_views(std::move(boxes));
   frame.position_stride = positions.empty() ? 0 : static_cast<cl_uint>(geometry->position_count);
   frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
   has_moved = true;

@@ -11,10 +11,10 @@
 
 namespace dpr {
 
-class NearPlane {
+class ClipPlanes {
  public:
-  NearPlane() = default;
-  explicit NearPlane(std::size_t meshes) : boxes_(meshes), is_known_(meshes, true) {}
+  ClipPlanes() = default;
+  explicit ClipPlanes(std::size_t meshes) : boxes_(meshes), is_known_(meshes, true) {}
 
   /// The mesh's positions are others than before.
   void move(std::size_t mesh) noexcept {
