@@ -1,6 +1,6 @@
-// Faces that cross the near plane, or the far plane alone. What is left of such a face is a triangle or a quadrilateral: one face
-// still, with one distance, to its outline, and the barycentrics of the whole face, so that what comes after
-// rasterization knows nothing of it. A quadrilateral is two triangles for coverage and barycentrics; by the
+// Faces that cross the near plane, or the far plane alone. What is left of such a face is a triangle or a
+// quadrilateral: one face still, with one distance, to its outline, and the barycentrics of the whole face, so that
+// what comes after rasterization knows nothing of it. A quadrilateral is two triangles for coverage and barycentrics; by the
 // rule of ownership the diagonal between them is no seam.
 //
 // These kernels follow those that treat every face as whole, and replace what they left of clipped ones.

@@ -1,7 +1,7 @@
 // Faces that cross the near plane or the far one, and gradients by way of the cuts that they get there. A cut divides
 // the way between two corners in homogeneous coordinates, NDC times depth, where that way is straight: part =
-// (z_kept - z) / (z_kept - z_lost), z being the plane's depth. Orthographic, NDC are such coordinates themselves. A lens distorts
-// what is left: the cuts, not the way to what is behind the camera.
+// (z_kept - z) / (z_kept - z_lost), z being the plane's depth. Orthographic, NDC are such coordinates themselves. A
+// lens distorts what is left: the cuts, not the way to what is behind the camera.
 #ifndef DPR_CLIP_H
 #define DPR_CLIP_H
 

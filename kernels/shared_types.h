@@ -83,9 +83,8 @@ typedef struct Triangle {
 /// lies between the face's corners first + 1 and first + 2, the second between first and first + 2; of three
 /// between first and first + 1, and first and first + 2 (all modulo 3).
 typedef struct ClippedFace {
-  float4 corner[3]; /* of the face, by a perfect lens: x, y in NDC times w, depth, w: depth, or 1 */
-  float4
-      cut[2]; /* x, y in NDC; depth, which is the plane's; the part of the way to the corner that is lost */
+  float4 corner[3];  /* of the face, by a perfect lens: x, y in NDC times w, depth, w: depth, or 1 */
+  float4 cut[2];     /* x, y in NDC; the plane's depth; the part of the way to the corner that is lost */
   float orientation; /* +1 counter-clockwise, -1 clockwise */
   uint corners;      /* 3 or 4; 0: the face is not clipped, and the rest not written */
   uint first, unused;

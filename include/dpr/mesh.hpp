@@ -51,8 +51,8 @@ struct Mesh {
   std::vector<std::uint32_t> face_materials{};  ///< [face] index into materials; empty: all have the first
   /// The probability that a surface is there where it may cover a pixel, from 0 to 1: at most one of the two is
   /// filled; with neither it is opaque. Below 1 it needs noise of the triangles (Noise::triangle), exact where the
-  /// composition is joint, and frames take longer: nothing is hidden. Images count 0 as 1e-6, and where the
-  /// gradient is asked for 1 as 1 - 1e-6, so that both have theirs.
+  /// composition is joint, and frames take longer: nothing is hidden. Images count 0 as 1e-6 (barrier:
+  /// 1e-20), and where the gradient is asked for 1 as 1 - 1e-6, so that both have theirs.
   std::vector<float> vertex_opacities{};  ///< [vertex], or empty
   std::vector<float> face_opacities{};    ///< [face], or empty
 };

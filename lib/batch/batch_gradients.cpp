@@ -120,8 +120,7 @@ void require_tangent(const NamedArray& tangent, std::size_t directions, std::spa
   if (tangent.name != "views" && (rows.empty() || !std::ranges::all_of(rows, is_known)))
     fail("an array along which images have none",
          "one of vertices, colors, face_colors, opacities, face_opacities, views, intrinsics, background, "
-         "sigma, "
-         "gamma and alpha");
+         "sigma, gamma and alpha");
   if (std::ranges::find(wanted, tangent.name) == wanted.end())
     fail("an array that was not named when it was rendered",
          "one of those in `gradients` of the frame's options");

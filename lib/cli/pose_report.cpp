@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <iterator>
 #include <memory>
 
@@ -21,8 +22,7 @@
 namespace dpr::cli {
 namespace {
 
-constexpr std::size_t k_strip_length = 12;  // the start among them
-constexpr std::size_t k_most_equals = 12;
+constexpr std::size_t k_strip_length = 12, k_most_equals = 12;  // the start among those of the strip
 
 /// Renders the scene with its body in any pose, in a light that was found.
 class PoseCamera {
@@ -41,6 +41,11 @@ class PoseCamera {
   template <typename Found>
   Image render(const Found& found, const Smoothing& smoothing) {
     return render(calibrated(camera_, found.focal_scale, found.radial), found.pose, smoothing);
+  }
+  /// Another light of the same kind.
+  void set_light(const FoundLight& light) {
+    gain_ = light.gain;
+    if (light.lights) renderer_.set_lights(light.lights);
   }
   Image render_start(const PoseResult& result) { return render(camera_, result.start, rigid_smoothing()); }
 
@@ -107,31 +112,16 @@ std::vector<Picture> write_frames(const std::filesystem::path& file, PoseCamera&
   return write_strip(file, images, captions);
 }
 
-/// The scene with all bodies but one where they were found.
-Scene with_others(const Scene& scene, std::span<const FoundBody> found, const FoundBody* one = nullptr) {
-  Scene result = scene;
-  for (const FoundBody& body : found) {
-    if (&body != one) PoseBody(scene, body.meshes).place(result, body.result.pose);
-  }
-  return result;
-}
-
-/// Poses that explain the target equally well, as the end is rendered, each in the light that is found with it.
-std::vector<Picture> write_equals(const std::filesystem::path& file, const Device& device, const Scene& scene,
-                                  std::span<const FoundBody> found, std::size_t body,
-                                  const PoseTarget& target) {
-  const PoseResult& result = found[body].result;
+/// Poses that explain the target equally well, as the end is rendered, each in the light that `light_with` finds with it.
+std::vector<Picture> write_equals(const std::filesystem::path& file, PoseCamera& camera,
+                                  const PoseResult& result,
+                                  const std::function<FoundLight(const PoseHypothesis&)>& light_with) {
   if (result.equals.size() < 2) return {};
-  std::vector<FoundBody> instead(found.begin(), found.end());
   std::vector<Image> images;
   std::vector<std::string> captions;
   for (const PoseHypothesis& other : result.equals) {
     if (images.size() == k_most_equals) break;
-    instead[body].result.pose = other.pose;
-    instead[body].result.focal_scale = other.focal_scale;
-    instead[body].result.radial = other.radial;
-    const FoundLight light = light_of(device, scene, instead, target);
-    PoseCamera camera(device, with_others(scene, found, &found[body]), found[body], light);
+    camera.set_light(light_with(other));
     images.push_back(camera.render(other, rigid_smoothing()));
     captions.push_back(format("%.2f degrees from the result, loss %.4g",
                               angle_degrees(other.pose.rotation, result.pose.rotation), other.loss));
@@ -173,6 +163,15 @@ Json iteration_to_json(const PoseIteration& step, const std::optional<glm::dmat3
              {"hypotheses", step.hypotheses}};
   if (truth) entry["angle_error_degrees"] = angle_degrees(step.pose.rotation, *truth);
   return entry;
+}
+
+/// The scene with all bodies but one where they were found.
+Scene with_others(const Scene& scene, std::span<const FoundBody> found, const FoundBody* one = nullptr) {
+  Scene result = scene;
+  for (const FoundBody& body : found) {
+    if (&body != one) PoseBody(scene, body.meshes).place(result, body.result.pose);
+  }
+  return result;
 }
 
 }  // namespace
@@ -340,9 +339,8 @@ FoundLight light_of(const Device& device, Scene scene, std::span<const FoundBody
   scene.smoothing = Smoothing();
   scene.smoothing.sigma = blur * blur;
   scene.camera = calibrated(scene.camera, result.focal_scale, result.radial);
-  const ShapeView view{
-      .image = target.image, .camera = scene.camera, .has_alpha = false, .mask = target.method.mask};
-  const LeastSquares& method = target.method;
+  const auto& [image, method] = target;
+  const ShapeView view{.image = image, .camera = scene.camera, .has_alpha = false, .mask = method.mask};
   const float open_scale = method.robust_scale > 0 ? method.robust_scale : k_robust_scale;
   const float scale = method.robust ? open_scale : 0;
   if (light == PoseLight::gain) return {find_gain(device, scene, view, scale), {}};
@@ -369,11 +367,16 @@ void write_pose_report(const std::filesystem::path& folder, const PageSource& so
     const PoseResult& result = found[i].result;
     const std::string number = found.size() > 1 ? "_" + std::to_string(i) : "";
     PoseCamera camera(device, with_others(scene, found, &found[i]), found[i], light);
+    const auto light_with = [&](const PoseHypothesis& other) {
+      std::vector<FoundBody> instead(found.begin(), found.end());
+      static_cast<PoseHypothesis&>(instead[i].result) = other;
+      return light_of(device, scene, instead, target);
+    };
     if (i == 0) end = camera.render(result, rigid_smoothing());
     iterations += result.iterations;
     BodyPictures& body = pictures.bodies.emplace_back();
     body.frames = write_frames(folder / ("iterations" + number + ".png"), camera, result, truth);
-    body.equals = write_equals(folder / ("equals" + number + ".png"), device, scene, found, i, target);
+    body.equals = write_equals(folder / ("equals" + number + ".png"), camera, result, light_with);
     body.plot = "plot" + number + ".png";
     body.curves = pose_plot(result.history, result.start.rotation, truth);
     if (!plot(folder / body.plot, body.curves)) {

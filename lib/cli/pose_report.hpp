@@ -62,8 +62,8 @@ void add_light(Json& json, const FoundLight& light);
 
 /// Writes target, start, end, difference, iterations and plot (all PNG), and index.html that shows them, into
 /// a folder, which is made if need be. Start and end are rendered rigidly, the iterations as the solver saw
-/// them, all in that light; poses that are equals, each in its own. Several bodies have iterations_0.png, plot_0.png and so on, which show a body's way with
-/// the others where they were found. Throws IoError.
+/// them, all in that light; poses that are equals, each in its own. Several bodies have iterations_0.png, plot_0.png
+/// and so on, which show a body's way with the others where they were found. Throws IoError.
 void write_pose_report(const std::filesystem::path& folder, const PageSource& source, const Device& device,
                        const Scene& scene, std::span<const FoundBody> found, const PoseTarget& target,
                        const FoundLight& light, bool quiet, const std::optional<glm::dmat3>& truth = {});

@@ -1,5 +1,5 @@
-/// Reference for faces that cross the near plane, or else the far plane: what is left of them, their fragments and the gradients of
-/// these.
+/// Reference for faces that cross the near plane, or else the far plane: what is left of them, their fragments and
+/// the gradients of these.
 ///
 /// Corners are homogeneous: NDC times depth, and depth. So the way between two of them is straight, whichever
 /// side of the camera they lie on; a lens distorts what is left.
