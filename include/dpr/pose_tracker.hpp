@@ -23,7 +23,7 @@ enum class TrackStatus {
 DPR_API LeastSquares track_least_squares();
 
 struct TrackOptions {
-  /// As for a single image, but that silhouettes and depths are refused. `mask` holds for every frame. `rotations` are
+  /// As for a single image, but that silhouettes and depths are the frames'. `mask` holds for every frame. `rotations` are
   /// tried where the object is looked for everywhere, and then divided among the places where it may be. The light is
   /// that of the first frame in which the object is found: fixed if the scene's own explains that, or else of the
   /// asked-for kind and found anew in every frame.
@@ -46,13 +46,22 @@ struct TrackOptions {
   bool covariance = false;
 };
 
+/// What was seen at one time, each image of the scene's size.
+struct TrackFrame {
+  Image image;  ///< linear colours; alpha plays no part
+  /// As LeastSquares has them, or empty in all frames. Frames may show nothing of the object: coverages may all be 0,
+  /// and no pixel need have a depth.
+  Image silhouette{}, depth{};
+};
+
 /// What a frame tells.
 struct TrackedPose {
   TrackStatus status = TrackStatus::lost;
   /// Object to world, as PoseResult::pose. Of a lost object the guess from which it is looked for: no result.
   Pose pose;
   /// Mean over colour channels and pixels of squared differences, linear colours, at the frame's size; robust ones as
-  /// LeastSquares::robust has them. Of a lost object that of the best pose that was tried.
+  /// LeastSquares::robust has them; with silhouettes and depths, weighed. Of a lost object that of the best pose that was
+  /// tried.
   double loss = 0;
   /// The loss below which the frame counts as explained; 0 while the object has not been seen at all.
   double explained_below = 0;
@@ -71,20 +80,24 @@ struct TrackedPose {
 /// (TrackOptions::search_interval), which takes tenths of a second about the last place and seconds everywhere.
 ///
 /// Renderers and buffers are kept: a frame that is tracked builds no kernel and seldom allocates on the device, where the
-/// object takes more room than ever before. They are made anew where the object's distance has changed by half. Results
-/// are the same bits from run to run on a device. Not thread-safe; movable.
+/// object takes more room than ever before. They are made anew where the object's distance has changed by half.
+/// Silhouettes and depths weigh by what the pose in the first frame with the object leaves of them. Results are the same
+/// bits from run to run on a device. Not thread-safe; movable.
 class DPR_API PoseTracker {
  public:
-  /// Throws InvalidArgument as PoseSolver does, for silhouettes and depths, and for options out of their range.
+  /// Throws InvalidArgument as PoseSolver does, for a silhouette or depths of the method, and for options out of their
+  /// range.
   explicit PoseTracker(Device device, const Scene& scene, TrackOptions options = {});
   ~PoseTracker();
   PoseTracker(PoseTracker&&) noexcept;
   PoseTracker& operator=(PoseTracker&&) noexcept;
 
-  /// The pose in the next frame: linear colours of the scene's size; alpha plays no part. Blocks. Throws InvalidArgument
-  /// for an image of another size or with a pixel that is not finite; then nothing has changed, and the next frame may
-  /// be tracked.
-  TrackedPose track(const Image& frame);
+  /// The pose in the next frame. Blocks. Throws InvalidArgument for an image of another size, a pixel out of its range,
+  /// a silhouette beside an unknown background, and for images of other kinds than the first frame's; then nothing has
+  /// changed, and the next frame may be tracked.
+  TrackedPose track(const TrackFrame& frame);
+  /// The same of colours alone.
+  TrackedPose track(const Image& image) { return track(TrackFrame{image}); }
 
   struct DPR_LOCAL Impl;
 

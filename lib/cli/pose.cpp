@@ -291,18 +291,11 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "Image of where the object is, 1, and where it is not, 0, which the render's coverage should match: in "
       "its alpha, if that is below 1 anywhere, or else in its first channel. Beside --target, or without",
       "IMAGE");
-  add("--silhouette-weight", method.silhouette.weight,
-      "Factor on the weight that the residuals give it, their inverse variance; 1 by default", "FLOAT");
   add("--depth", options.pictures.depth,
       "Image whose first channel is the distance along the camera's axis, as --aov depth of dpr render "
       "writes it; 0 or NaN where it is not known. Beside --target, or without",
       "DEPTH.exr");
-  add("--depth-scale", options.pictures.depth_scale,
-      "Length of a 1 of that file, in the scene's units: 0.001 for a 16-bit PNG of millimetres and a scene "
-      "in metres; files of whole numbers need one",
-      "FLOAT");
-  add("--depth-weight", method.depth.weight, "Factor on the weight that the residuals give it; 1 by default",
-      "FLOAT");
+  add_observation_weights(command, k_least_squares_group, method, options.pictures.depth_scale);
   command
       .add_flag("--focal", options.solver.solve_focal, "Look for a factor on the camera's focal length too")
       ->group(k_least_squares_group);

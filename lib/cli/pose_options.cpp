@@ -45,6 +45,21 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
       "MASK.png");
 }
 
+void add_observation_weights(CLI::App& command, const char* group, LeastSquares& method,
+                             std::optional<float>& depth_scale) {
+  const auto add = [&](const char* name, auto& value, const char* description) {
+    command.add_option(name, value, description)->group(group)->type_name("FLOAT");
+  };
+  add("--silhouette-weight", method.silhouette.weight,
+      "Factor on the weight that the residuals give silhouettes, their inverse variance; 1 by default");
+  add("--depth-scale", depth_scale,
+      "Length of a 1 of depth files, in the scene's units: 0.001 for 16-bit PNGs of millimetres and a scene "
+      "in "
+      "metres; files of whole numbers need one");
+  add("--depth-weight", method.depth.weight,
+      "Factor on the weight that the residuals give depths; 1 by default");
+}
+
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options) {
   LeastSquares method = options.method;
   method.robust = command.count("--robust") > 0 || method.unknown_background;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "cli/option_names.hpp"
@@ -19,6 +20,10 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
 /// Their fields that have another name there.
 inline const OptionNames k_least_squares_names{{"iterations", "--level-iterations"},
                                                {"robust_scale", "--robust"}};
+
+/// --silhouette-weight, --depth-scale and --depth-weight.
+void add_observation_weights(CLI::App& command, const char* group, LeastSquares& method,
+                             std::optional<float>& depth_scale);
 
 /// The method that the options describe, without the mask. Throws InvalidArgument.
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options);

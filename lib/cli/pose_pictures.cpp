@@ -17,26 +17,6 @@ glm::ivec2 picture_size(const Image& image) { return {image.width, image.height}
 
 std::string size_text(glm::ivec2 size) { return checks::size(size.x, size.y); }
 
-Image read_silhouette(const std::string& file) {
-  Image image = read_image(file, nullptr, Encoding::linear);
-  if (has_silhouette(image)) {
-    for (glm::vec4& pixel : image.pixels) pixel = glm::vec4(pixel.a);
-  }
-  return image;
-}
-
-Image read_depth(const std::string& file, std::optional<float> scale) {
-  PixelFacts facts;
-  Image image = read_pixels(file, facts);
-  if (!facts.floats && !scale) {
-    throw InvalidArgument(named("--depth", file), "whole numbers",
-                          "--depth-scale, the length of a 1 in the scene's units, or a file of floats");
-  }
-  for (glm::vec4& pixel : image.pixels)
-    pixel = glm::vec4(glm::vec3(pixel.x * facts.largest * scale.value_or(1.0F)), pixel.w);
-  return image;
-}
-
 Image scaled_depth(Image depth, glm::ivec2 size) {
   constexpr float k_most = 0.5F;  // of a pixel's area
   for (glm::vec4& pixel : depth.pixels) pixel.w = has_depth(pixel) ? 1 : 0;
@@ -70,6 +50,26 @@ glm::ivec2 ObservedPictures::size() const {
   for (const Image* image : {&target, &silhouette})
     if (!image->pixels.empty()) return picture_size(*image);
   return picture_size(depth);
+}
+
+Image read_silhouette(const std::string& file) {
+  Image image = read_image(file, nullptr, Encoding::linear);
+  if (has_silhouette(image)) {
+    for (glm::vec4& pixel : image.pixels) pixel = glm::vec4(pixel.a);
+  }
+  return image;
+}
+
+Image read_depth(const std::string& file, std::optional<float> scale) {
+  PixelFacts facts;
+  Image image = read_pixels(file, facts);
+  if (!facts.floats && !scale) {
+    throw InvalidArgument(named("--depth", file), "whole numbers",
+                          "--depth-scale, the length of a 1 in the scene's units, or a file of floats");
+  }
+  for (glm::vec4& pixel : image.pixels)
+    pixel = glm::vec4(glm::vec3(pixel.x * facts.largest * scale.value_or(1.0F)), pixel.w);
+  return image;
 }
 
 ObservedPictures read_pictures(const PosePictureFiles& files, const LossWeights& weights, Encoding encoding) {

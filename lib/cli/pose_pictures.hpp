@@ -30,6 +30,10 @@ struct ObservedPictures {
   glm::ivec2 size() const;
 };
 
+/// --silhouette's file, and --depth's: throw IoError, and InvalidArgument for depths of whole numbers without a scale.
+Image read_silhouette(const std::string& file);
+Image read_depth(const std::string& file, std::optional<float> scale);
+
 /// Throws IoError, and InvalidArgument where the files show nothing to compare, where silhouettes are to be compared
 /// and the target shows none, and where a depth file of whole numbers has no scale.
 ObservedPictures read_pictures(const PosePictureFiles& files, const LossWeights& weights, Encoding encoding);

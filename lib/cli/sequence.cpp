@@ -112,12 +112,11 @@ std::vector<std::filesystem::path> numbered_files(const std::filesystem::path& p
 }
 
 /// What a name stands for.
-std::vector<std::filesystem::path> files_of(const std::string& name) {
+std::vector<std::filesystem::path> files_of(const char* option, const std::string& name) {
   const std::filesystem::path path(name);
   if (std::filesystem::is_directory(path)) {
     std::vector<std::filesystem::path> files = images_in(path);
-    if (files.empty())
-      throw InvalidArgument(named("--sequence", name), "a folder without images", "images in it");
+    if (files.empty()) throw InvalidArgument(named(option, name), "a folder without images", "images in it");
     return files;
   }
   if (std::filesystem::exists(path)) return {path};
@@ -125,8 +124,16 @@ std::vector<std::filesystem::path> files_of(const std::string& name) {
   if (!numbered) return {path};  // not there, which is an error when its turn comes
   std::vector<std::filesystem::path> files = numbered_files(path, *numbered);
   if (files.empty()) {
-    throw InvalidArgument(named("--sequence", name), "no file that matches",
+    throw InvalidArgument(named(option, name), "no file that matches",
                           "a file, a folder, or a pattern such as frames/%04d.png of files that are there");
+  }
+  return files;
+}
+
+std::deque<std::filesystem::path> files_of(const char* option, const std::vector<std::string>& names) {
+  std::deque<std::filesystem::path> files;
+  for (const std::string& name : names) {
+    for (std::filesystem::path& file : files_of(option, name)) files.push_back(std::move(file));
   }
   return files;
 }
@@ -157,11 +164,24 @@ bool is_naturally_less(const std::string& a, const std::string& b) {
 }
 
 Sequence::Sequence(const std::vector<std::string>& names, Encoding encoding, const Scene& scene)
-    : encoding_(encoding), size_of_frames_(scene.width, scene.height) {
-  for (const std::string& name : names) {
-    for (std::filesystem::path& file : files_of(name)) files_.push_back(std::move(file));
-  }
+    : option_("--sequence"),
+      files_(files_of(option_, names)),
+      reader_([encoding](const std::string& file) { return read_image(file, nullptr, encoding); }),
+      encoding_(encoding),
+      size_of_frames_(scene.width, scene.height) {
   if (std::ranges::none_of(files_, is_video)) size_ = files_.size();
+}
+
+Sequence::Sequence(const char* option, const std::vector<std::string>& names, const Scene& scene,
+                   Reader reader)
+    : option_(option),
+      files_(files_of(option, names)),
+      reader_(std::move(reader)),
+      size_of_frames_(scene.width, scene.height),
+      size_(files_.size()) {
+  const auto video = std::ranges::find_if(files_, is_video);
+  if (video != files_.end())
+    throw InvalidArgument(named(option, video->string()), "a video", "an image for each frame");
 }
 
 std::optional<SequenceFrame> Sequence::next() {
@@ -169,7 +189,7 @@ std::optional<SequenceFrame> Sequence::next() {
     const std::filesystem::path file = files_.front();
     if (!is_video(file)) {
       files_.pop_front();
-      return checked(file.string(), read_image(file, nullptr, encoding_));
+      return checked(file.string(), reader_(file.string()));
     }
     if (auto frame = next_of_video()) return frame;
     files_.pop_front();
@@ -191,7 +211,7 @@ std::optional<SequenceFrame> Sequence::next_of_video() {
 }
 
 SequenceFrame Sequence::checked(std::string file, Image image) const {
-  require_size(image, size_of_frames_, named("--sequence", file));
+  require_size(image, size_of_frames_, named(option_, file));
   return {std::move(file), std::move(image)};
 }
 

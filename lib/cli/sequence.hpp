@@ -1,9 +1,10 @@
-// The frames of --sequence: files in their order, or a video.
+// The frames of --sequence: files in their order, or a video; and images beside them.
 #pragma once
 
 #include <cstddef>
 #include <deque>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,9 +28,13 @@ struct SequenceFrame {
 /// highest that there is; or a video.
 class Sequence {
  public:
+  using Reader = std::function<Image(const std::string& file)>;
+
   /// Images must have the scene's size. Throws InvalidArgument where a folder or a pattern has no file, IoError where a
   /// folder cannot be read.
   Sequence(const std::vector<std::string>& names, Encoding encoding, const Scene& scene);
+  /// The same of another option, read otherwise. Throws InvalidArgument for videos.
+  Sequence(const char* option, const std::vector<std::string>& names, const Scene& scene, Reader reader);
 
   /// None behind the last. Throws IoError, and InvalidArgument for a frame of another size.
   std::optional<SequenceFrame> next();
@@ -40,8 +45,10 @@ class Sequence {
   std::optional<SequenceFrame> next_of_video();
   SequenceFrame checked(std::string file, Image image) const;
 
+  const char* option_;
   std::deque<std::filesystem::path> files_;
-  Encoding encoding_;
+  Reader reader_;
+  Encoding encoding_ = Encoding::linear;  // of videos
   glm::ivec2 size_of_frames_;
   std::optional<std::size_t> size_;
   std::optional<Video> video_;  // that is being read, the first of the files

@@ -9,9 +9,11 @@
 #include "cli/commands.hpp"
 #include "cli/option_names.hpp"
 #include "cli/pose_options.hpp"
+#include "cli/pose_pictures.hpp"
 #include "cli/progress.hpp"
 #include "cli/provenance.hpp"
 #include "cli/sequence.hpp"
+#include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "cli/track_files.hpp"
 #include "cli/track_report.hpp"
@@ -26,9 +28,63 @@ const char* const k_method_group = "Least squares";
 
 struct TrackCommandOptions {
   std::string scene, initial_rotation, output, csv, report;
-  std::vector<std::string> sequence;
+  std::vector<std::string> sequence, silhouettes, depths;
+  std::optional<float> depth_scale;
   LeastSquaresOptions least_squares{.method = TrackOptions().method};
   TrackOptions tracker;
+};
+
+/// Frames, and what was observed in each beside its colours.
+class Frames {
+ public:
+  Frames(const TrackCommandOptions& options, const CommonOptions& common, const Scene& scene)
+      : images_(options.sequence, common.encoding(), scene) {
+    if (options.depth_scale && options.depths.empty())
+      throw InvalidArgument("--depth-scale (command line)", "no --depth", "the files whose unit it is");
+    add("--silhouette", options.silhouettes, scene, read_silhouette, &TrackFrame::silhouette);
+    add(
+        "--depth", options.depths, scene,
+        [scale = options.depth_scale](const std::string& file) { return read_depth(file, scale); },
+        &TrackFrame::depth);
+  }
+
+  std::optional<std::size_t> size() const { return images_.size(); }
+
+  /// The frame and the name of its image; none behind the last.
+  std::optional<std::pair<std::string, TrackFrame>> next() {
+    std::optional<SequenceFrame> image = images_.next();
+    if (!image) return std::nullopt;
+    TrackFrame frame{std::move(image->image)};
+    for (Beside& beside : beside_) {
+      std::optional<SequenceFrame> own = beside.sequence.next();
+      if (!own) {
+        throw InvalidArgument(std::string(beside.option) + " (command line)", "none for " + image->file,
+                              "an image for each frame");
+      }
+      frame.*beside.member = std::move(own->image);
+    }
+    return std::pair(std::move(image->file), std::move(frame));
+  }
+
+ private:
+  struct Beside {
+    const char* option;
+    Sequence sequence;
+    Image TrackFrame::*member;
+  };
+
+  void add(const char* option, const std::vector<std::string>& names, const Scene& scene,
+           const Sequence::Reader& reader, Image TrackFrame::*member) {
+    if (names.empty()) return;
+    beside_.push_back({option, Sequence(option, names, scene, reader), member});
+    const std::size_t count = *beside_.back().sequence.size();
+    if (!size() || count == *size()) return;
+    throw InvalidArgument(std::string(option) + " (command line)", std::to_string(count) + " images",
+                          std::to_string(*size()) + ", one for each frame");
+  }
+
+  Sequence images_;
+  std::vector<Beside> beside_;
 };
 
 /// A run: the frames so far.
@@ -42,16 +98,17 @@ class Run {
   }
 
   /// Tracks all frames.
-  void follow(PoseTracker& tracker, Sequence& sequence) {
-    Progress progress(static_cast<unsigned>(sequence.size().value_or(0)), common_.quiet, "frame");
+  void follow(PoseTracker& tracker, Frames& frames) {
+    Progress progress(static_cast<unsigned>(frames.size().value_or(0)), common_.quiet, "frame");
     for (;;) {
       const Clock::time_point start = Clock::now();
-      const std::optional<SequenceFrame> frame = sequence.next();
-      if (!frame) return;
+      const auto next = frames.next();
+      if (!next) return;
+      const auto& [file, frame] = *next;
       const double reading = seconds_since(start);
-      TrackRow row{rows_.size(), frame->file, tracker.track(frame->image), 0};
+      TrackRow row{rows_.size(), file, tracker.track(frame), 0};
       row.seconds = seconds_since(start) - reading;
-      add(row, frame->image, reading);
+      add(row, frame.image, reading);
       progress.update(
           static_cast<unsigned>(rows_.size()),
           format("%s  loss %.4e", std::string(name_of(row.found.status)).c_str(), row.found.loss));
@@ -116,13 +173,13 @@ void run(const CLI::App& command, TrackCommandOptions& options, const CommonOpti
     transform =
         affine(rotation * polar_decomposition(glm::dmat3(transform)).stretch, glm::dvec3(transform[3]));
   }
-  Sequence sequence(options.sequence, common.encoding(), scene);
+  Frames frames(options, common, scene);
   const Device device = open_device(common);
   PoseTracker tracker = with_option_names(command, k_least_squares_names,
                                           [&] { return PoseTracker(device, scene, options.tracker); });
   Run track(options, common, device, scene);
   try {
-    track.follow(tracker, sequence);
+    track.follow(tracker, frames);
   } catch (const Error& error) {
     // The poses found until then are not lost.
     if (!track.is_empty()) track.write(error.what());
@@ -196,7 +253,21 @@ void add_track_command(CLI::App& application, CommonOptions& common) {
                    "Folder for a page with plots, and pictures of some frames with the object's outline")
       ->type_name("DIR");
   add_tracking_options(*command, options->tracker);
+  command
+      ->add_option(
+          "--silhouette", options->silhouettes,
+          "Images of where the object is, one for each frame, named as those of --sequence: 1, and 0 "
+          "where it is not, in the alpha, if that is below 1 anywhere, or else in the first channel")
+      ->group(k_tracking_group)
+      ->type_name("FILE");
+  command
+      ->add_option("--depth", options->depths,
+                   "Images of depths, one for each frame, named as those of --sequence: the distance along "
+                   "the camera's axis in the first channel; 0 or NaN where it is not known")
+      ->group(k_tracking_group)
+      ->type_name("FILE");
   add_least_squares_options(*command, k_method_group, options->least_squares);
+  add_observation_weights(*command, k_method_group, options->least_squares.method, options->depth_scale);
   add_image_options(*command, common);
   command->footer(
       "Example: dpr track --scene scene.json --sequence 'frames/%04d.png' --translation -o track.json "

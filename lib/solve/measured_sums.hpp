@@ -27,6 +27,9 @@ class MeasuredSums {
   /// sums' kernels.
   MeasuredSums(const Device& device, const std::vector<cl_float4>& target, const std::string& options);
 
+  /// Another target, as large.
+  void set_target(const std::vector<cl_float4>& target) { target_.upload(impl_of(device_), target); }
+
   /// Leaves residuals; returns the losses of the views, summed over pixels. Images are [view][pixel], RGBA; depths have
   /// depth times alpha for red, and are not read where none counts.
   std::vector<double> losses(const Buffer<cl_float4>& colors, const Buffer<cl_float4>& depths,

@@ -81,8 +81,11 @@ class NormalSums {
   /// `directions`: number of parameters of a hypothesis.
   NormalSums(const Device& device, const WeighedTarget& target, PoseLight light, std::size_t directions);
 
-  /// Other colours, as many; their weights stay.
-  void set_target(const std::vector<cl_float4>& colors) { target_.upload(impl_of(device_), colors); }
+  /// Other colours, and what else was measured, of as many pixels; colours' weights stay.
+  void set_target(const WeighedTarget& target) {
+    target_.upload(impl_of(device_), target.colors);
+    if (measured_) measured_->set_target(target.measured);
+  }
 
   /// Losses of every view.
   std::vector<double> losses(const HypothesisImages& images, const LossScales& scales);

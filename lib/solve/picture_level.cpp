@@ -71,7 +71,7 @@ Image allowed(const std::optional<PoseBox>& box, const Scene& scene, int width, 
     for (int column = 0; column < width; ++column) {
       const glm::vec2 at(column, row);
       const glm::vec2 shared = glm::clamp(glm::min(at + 1.0F, high) - glm::max(at, low), 0.0F, 1.0F);
-      image.at(column, row) = glm::vec4(shared.x * shared.y);
+      image.at(column, row).x = shared.x * shared.y;
     }
   }
   return image;
@@ -121,52 +121,47 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
     show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));
   target_.background = scene.background;
   target_.has_unknown_background = has_unknown_background_;
-  const Image mask = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
-                                                 : resample(options.mask, width(), height());
-  if (counts_colors_) {
-    resample_colors(target);
-    for (const glm::vec4& p : mask.pixels) target_.weights.push_back(p.x);
-  } else {
-    target_.colors.resize(mask.pixels.size());
-    target_.weights.resize(mask.pixels.size());
-  }
-  if (weighs_observations_ || has_unknown_background_) target_.measured = measured(options, mask);
-  if (has_unknown_background_) {
-    const Image wanted = allowed(options.box, scene, width(), height());
-    for (std::size_t i = 0; i < wanted.pixels.size(); ++i) {
-      target_.measured[i].s[2 * k_coverage] = wanted.pixels[i].x;
-      target_.measured[i].s[2 * k_coverage + 1] = mask.pixels[i].x;
-    }
-  }
+  mask_ = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
+                                      : resample(options.mask, width(), height());
+  if (has_unknown_background_) allowed_ = allowed(options.box, scene, width(), height());
+  for (const glm::vec4& p : mask_.pixels) target_.weights.push_back(counts_colors_ ? p.x : 0);
+  resample_images({target, options.silhouette.image, options.depth.image});
   sums_.emplace(device, target_, light, space_.size());
 }
 
-void PictureLevel::resample_colors(const Image& target) {
+void PictureLevel::resample_images(const PictureImages& images) {
   target_.colors.clear();
-  for (const glm::vec4& p : resample(target, width(), height()).pixels)
-    target_.colors.push_back({{p.x, p.y, p.z, p.w}});
+  target_.colors.resize(mask_.pixels.size());
+  if (counts_colors_) {
+    const Image colors = resample(images.target, width(), height());
+    std::ranges::transform(colors.pixels, target_.colors.begin(), [](const glm::vec4& p) {
+      return cl_float4{{p.x, p.y, p.z, p.w}};
+    });
+  }
+  if (weighs_observations_ || has_unknown_background_) target_.measured = measured(images);
 }
 
-void PictureLevel::set_target(const Image& target) {
-  resample_colors(target);
-  sums_->set_target(target_.colors);
+void PictureLevel::set_images(const PictureImages& images) {
+  resample_images(images);
+  sums_->set_target(target_);
 }
 
-std::vector<cl_float4> PictureLevel::measured(const LeastSquares& options, const Image& mask) const {
-  std::vector<cl_float4> result(mask.pixels.size());
+std::vector<cl_float4> PictureLevel::measured(const PictureImages& images) const {
+  std::vector<cl_float4> result(mask_.pixels.size());
   const auto add = [&](const Image& image, std::size_t kind) {
     for (std::size_t i = 0; i < result.size(); ++i) {
       result[i].s[2 * kind] = image.pixels[i].x;
-      result[i].s[2 * kind + 1] = image.pixels[i].w * mask.pixels[i].x;
+      result[i].s[2 * kind + 1] = image.pixels[i].w * mask_.pixels[i].x;
     }
   };
-  Image silhouette = options.silhouette.image, depth = options.depth.image;
+  Image silhouette = images.silhouette, depth = images.depth;
   for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
   if (silhouette.pixels.empty() && !counts_colors_ && space_.body().is_alone() && space_.may_cover(depth)) {
     silhouette = depth;
     for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
   for (glm::vec4& p : silhouette.pixels) p.w = 1;
+  if (has_unknown_background_) add(allowed_, k_coverage);
   if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
   if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
   return result;
@@ -331,12 +326,29 @@ double PictureLevel::blank_loss() {
   return std::min(blank, losses({&absent, 1}).front());
 }
 
-double PictureLevel::uncovered_loss(const Hypothesis& hypothesis) {
-  if (!has_unknown_background_) return 0;
-  LossScales covered = scales_;
-  covered.measured[k_coverage].weight = 0;
+LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
+  const bool counts_depths = counts_colors_ && depths_;
+  LossParts parts;
+  if (!has_unknown_background_ && !counts_depths) return parts;
   const HypothesisImages images = render({&hypothesis, 1});
-  return sums_->losses(images, scales_).front() - sums_->losses(images, covered).front();
+  const double loss = sums_->losses(images, scales_).front();
+  const auto without = [&](std::size_t kind) {
+    LossScales scales = scales_;
+    scales.measured[kind].weight = 0;
+    return sums_->losses(images, scales).front();
+  };
+  if (has_unknown_background_) parts.uncovered = loss - without(k_coverage);
+  if (counts_depths) {
+    // Depths match that leave less than this part of what quite other ones do: the scale is four deviations.
+    constexpr double k_matched = 0.2;
+    constexpr float k_sharper = 1e4F;
+    const double others = without(k_depth);
+    LossScales most = scales_;
+    most.measured[k_depth].scale /= k_sharper;
+    most.measured[k_depth].weight *= k_sharper * k_sharper;
+    parts.matched = std::min(loss - others, k_matched * (sums_->losses(images, most).front() - others));
+  }
+  return parts;
 }
 
 }  // namespace dpr

@@ -18,6 +18,19 @@
 
 namespace dpr {
 
+/// What was seen in a picture, of the scene's size; empty: nothing of that kind.
+struct PictureImages {
+  const Image &target, &silhouette, &depth;
+};
+
+/// Parts of a hypothesis' loss that say nothing against it.
+struct LossParts {
+  double uncovered = 0;  ///< of pixels that it does not cover; 0 where the background is known
+  double matched = 0;    ///< of depths that match, beside colours
+
+  double sum() const { return uncovered + matched; }
+};
+
 class PictureLevel {
  public:
   /// An empty target: colours do not count. `space`: hypotheses' parameters, in the axes of its own camera, which need
@@ -27,8 +40,8 @@ class PictureLevel {
                const PoseSpace& space, const LevelShape& shape, PoseLight light, CornerNormals normals,
                const std::optional<glm::dmat3>& rotation = {});
 
-  /// Another target of the same size, where colours count. Nothing is allocated on the device.
-  void set_target(const Image& target);
+  /// Another picture of the same size and kinds, where colours count. Nothing is allocated on the device.
+  void set_images(const PictureImages& images);
 
   /// The loss of every hypothesis (NormalSums).
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
@@ -54,8 +67,7 @@ class PictureLevel {
   /// The least loss of pictures without the object: the scene's background, the target's mean colour, and the meshes
   /// that stand still.
   double blank_loss();
-  /// The part of a hypothesis' loss that pixels leave which it does not cover; 0 where the background is known.
-  double uncovered_loss(const Hypothesis& hypothesis);
+  LossParts loss_parts(const Hypothesis& hypothesis);
 
   std::size_t parameters() const { return space_.size(); }
   int width() const { return scene_.width / samples_; }
@@ -79,10 +91,10 @@ class PictureLevel {
   /// Images of views, pixels being means over their samples.
   const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
   const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
-  /// The target's colours at the level's size.
-  void resample_colors(const Image& target);
+  /// Takes the images to the level's size.
+  void resample_images(const PictureImages& images);
   /// What was observed beside colours, at the level's size.
-  std::vector<cl_float4> measured(const LeastSquares& options, const Image& mask) const;
+  std::vector<cl_float4> measured(const PictureImages& images) const;
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
   /// The same beside their tangents.
   std::pair<HypothesisImages, HypothesisTangents> render_tangents(std::span<const Hypothesis> hypotheses);
@@ -95,6 +107,7 @@ class PictureLevel {
   std::optional<Images> normals_, depths_;
   bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
   bool has_unknown_background_, weighs_observations_;
+  Image mask_, allowed_;  // of the level's size; where the object may be, if the background is not known
   std::array<float, 2> factors_;  // on the weights of coverage and depth
   WeighedTarget target_;
   std::optional<NormalSums> sums_;

@@ -103,19 +103,25 @@ double PoseLevel::blank_loss() {
   return sum / static_cast<double>(pictures_.size());
 }
 
-double PoseLevel::uncovered_loss(const Hypothesis& hypothesis) {
-  double sum = 0;
-  for (PictureLevel& picture : pictures_) sum += picture.uncovered_loss(hypothesis);
-  return sum / static_cast<double>(pictures_.size());
+LossParts PoseLevel::loss_parts(const Hypothesis& hypothesis) {
+  LossParts mean;
+  const auto count = static_cast<double>(pictures_.size());
+  for (PictureLevel& picture : pictures_) {
+    const LossParts own = picture.loss_parts(hypothesis);
+    mean.uncovered += own.uncovered / count;
+    mean.matched += own.matched / count;
+  }
+  return mean;
 }
 
 std::vector<double> PoseLevel::blank_parts(const Hypothesis& hypothesis) {
-  std::vector<double> parts;
+  std::vector<double> result;
   for (PictureLevel& picture : pictures_) {
-    const double uncovered = picture.uncovered_loss(hypothesis), blank = picture.blank_loss() - uncovered;
-    parts.push_back(blank > 0 ? (picture.losses({&hypothesis, 1}).front() - uncovered) / blank : 1);
+    const LossParts parts = picture.loss_parts(hypothesis);
+    const double blank = picture.blank_loss() - parts.uncovered;
+    result.push_back(blank > 0 ? (picture.losses({&hypothesis, 1}).front() - parts.sum()) / blank : 1);
   }
-  return parts;
+  return result;
 }
 
 }  // namespace dpr

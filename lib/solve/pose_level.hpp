@@ -28,8 +28,8 @@ class PoseLevel {
             const LevelShape& shape, PoseLight light, CornerNormals normals)
       : PoseLevel(device, {&picture, 1}, space, shape, light, normals) {}
 
-  /// Another target for an only picture.
-  void set_target(const Image& target) { pictures_.front().set_target(target); }
+  /// Another picture in place of an only one.
+  void set_images(const PictureImages& images) { pictures_.front().set_images(images); }
 
   std::vector<double> losses(std::span<const Hypothesis> hypotheses);
   std::vector<NormalEquations> linearize(std::span<const Hypothesis> hypotheses);
@@ -49,8 +49,8 @@ class PoseLevel {
   /// The mean of the pictures'.
   float color_scale() const;
   double blank_loss();
-  double uncovered_loss(const Hypothesis& hypothesis);
-  /// [picture] Loss in parts of a blank one's, of both without what is not covered.
+  LossParts loss_parts(const Hypothesis& hypothesis);
+  /// [picture] Loss in parts of a blank one's, without what says nothing against the hypothesis.
   std::vector<double> blank_parts(const Hypothesis& hypothesis);
 
   int width() const { return pictures_.front().width(); }

@@ -118,14 +118,14 @@ FittedPose Fit::run() {
   wrong_ = wrong_loss(sampled);
   const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
   finish(level);
-  const double uncovered = level.uncovered_loss(candidates_.front().hypothesis);
+  const LossParts parts = level.loss_parts(candidates_.front().hypothesis);
   const double blank = sampled.blank_loss(),
                unexplained = method_.unknown_background ? blank : std::min(wrong_, blank);
   const bool is_robust = method_.robust || (!has_colors_ && !method_.depth.image.pixels.empty());
   if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
-  if (unexplained - uncovered > k_least_covered * unexplained)
-    result_.unexplained_part = (result_.loss - uncovered) / (unexplained - uncovered);
-  if (!fills_picture(uncovered, blank) &&
+  if (unexplained - parts.uncovered > k_least_covered * unexplained)
+    result_.unexplained_part = (result_.loss - parts.sum()) / (unexplained - parts.uncovered);
+  if (!fills_picture(parts.uncovered, blank) &&
       result_.unexplained_part < explained_part(options_.explained, is_robust)) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
   } else {

@@ -14,6 +14,7 @@
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/pose_search.hpp"
+#include "solve/resample.hpp"
 #include "solve/track_levels.hpp"
 #include "solve/track_starts.hpp"
 
@@ -34,7 +35,7 @@ PoseOptions pose_options(const TrackOptions& options) {
 void validate(const TrackOptions& options) {
   if (has_observations(options.method)) {
     throw InvalidArgument("method (track)", "a silhouette or depths, which are of one image",
-                          "colours alone, which every frame has");
+                          "none: each frame has its own");
   }
   require(options.damping >= 0 && options.damping <= 1, "damping (track)", options.damping,
           "a number in [0, 1]");
@@ -60,7 +61,7 @@ struct PoseTracker::Impl {
         motion(start, static_cast<double>(options.damping)),
         half_turns(dpr::half_turns(body.points(pivot.scene()))) {}
 
-  TrackedPose track(const Image& frame);
+  TrackedPose track(const TrackFrame& frame);
 
  private:
   /// The solver for single images finds what is wrong with the scene or the method.
@@ -79,9 +80,10 @@ struct PoseTracker::Impl {
   /// 0 of a hypothesis that covers nothing where the background is not known.
   double explained_below(const Hypothesis& hypothesis) {
     const double unexplained = levels->unexplained(levels->size() - 1);
-    const double uncovered = levels->finest().uncovered_loss(hypothesis), covered = unexplained - uncovered;
+    const LossParts parts = levels->finest().loss_parts(hypothesis);
+    const double covered = unexplained - parts.uncovered;
     if (covered <= k_least_covered * unexplained) return 0;
-    return uncovered + explained_part(options.explained, options.method.robust) * covered;
+    return parts.sum() + explained_part(options.explained, options.method.robust) * covered;
   }
   /// The loss in parts of what is allowed: below 1 if it explains the frame; no number if nothing is left or allowed.
   double share(const Candidate& candidate) {
@@ -89,8 +91,9 @@ struct PoseTracker::Impl {
   }
   bool is_explained(const Candidate& candidate) { return share(candidate) < 1; }
 
-  TrackedPose first(const Image& frame);
-  void make_levels(const Pose& near, const Image& frame);
+  void check(const TrackFrame& frame) const;
+  TrackedPose first(const TrackFrame& frame);
+  void make_levels(const Pose& near, const TrackFrame& frame);
   std::optional<Candidate> follow();
   std::size_t first_level() const;
   Candidate follow_from(std::size_t level, const Pose& pose);
@@ -109,7 +112,8 @@ struct PoseTracker::Impl {
   Pose start;  // about the pivot, as all poses here
   PoseMotion motion;
   std::array<glm::dmat3, 3> half_turns;
-  unsigned misses = 0;                  // frames since the object was seen
+  bool has_frame = false, has_silhouette = false, has_depth = false;  // as the first frame, if there was one
+  unsigned misses = 0;                                                // frames since the object was seen
   std::optional<FittedPose> seen;       // in the first frame that showed the object
   std::unique_ptr<TrackLevels> levels;  // made then
   // Distance that the last prediction was off by, NDC at the rim.
@@ -118,10 +122,39 @@ struct PoseTracker::Impl {
   double least_loss = 0;   // of the poses tried in a frame that is not explained
 };
 
-TrackedPose PoseTracker::Impl::track(const Image& frame) {
+void PoseTracker::Impl::check(const TrackFrame& frame) const {
   const Scene& scene = pivot.scene();
-  require_size(frame, scene, "frame");
-  checks::require_pixels(frame, "frame (track)");
+  require_size(frame.image, scene, "frame");
+  checks::require_pixels(frame.image, "frame (track)");
+  const auto check_kind = [&](const Image& image, bool is_wanted, const char* name, const char* expected,
+                              const auto& is_right) {
+    const bool is_there = !image.pixels.empty();
+    if (has_frame && is_there != is_wanted)
+      throw InvalidArgument(checks::in(name, "track"), is_there ? "one" : "none", "what the first frame has");
+    if (!is_there) return;
+    require_size(image, scene, name);
+    const auto wrong = std::ranges::find_if_not(image.pixels, is_right);
+    if (wrong == image.pixels.end()) return;
+    throw InvalidArgument(checks::in("pixel of the " + std::string(name), "track"), checks::text(wrong->x),
+                          expected);
+  };
+  check_kind(frame.silhouette, has_silhouette, "silhouette", "a coverage in [0, 1]",
+             [](const glm::vec4& p) { return p.x >= 0 && p.x <= 1; });
+  check_kind(frame.depth, has_depth, "depth", "a distance along the camera's axis, or 0 for none",
+             [](const glm::vec4& p) { return !dpr::has_depth(p) || p.x > 0; });
+  if (options.method.unknown_background && !frame.silhouette.pixels.empty()) {
+    throw InvalidArgument("silhouette (track)", "one, which tells the background apart",
+                          "none beside an unknown background");
+  }
+}
+
+TrackedPose PoseTracker::Impl::track(const TrackFrame& frame) {
+  check(frame);
+  if (!has_frame) {
+    has_frame = true;
+    has_silhouette = !frame.silhouette.pixels.empty();
+    has_depth = !frame.depth.pixels.empty();
+  }
   if (!seen) return first(frame);
   if (levels->suits(motion.last())) {
     levels->set_frame(frame);
@@ -137,12 +170,14 @@ TrackedPose PoseTracker::Impl::track(const Image& frame) {
 }
 
 /// A frame before the object was seen at all.
-TrackedPose PoseTracker::Impl::first(const Image& frame) {
+TrackedPose PoseTracker::Impl::first(const TrackFrame& frame) {
   const bool anywhere = (options.search || misses > 0) && is_due();
+  LeastSquares method = observing(options.method, frame);
+  if (!anywhere) method.rotations = 0;
   PoseOptions single = pose_options(options);
-  if (!anywhere) std::get<LeastSquares>(single.method).rotations = 0;
+  single.method = std::move(method);
   const Foreknowledge known = anywhere ? Foreknowledge::place : Foreknowledge::start;
-  FittedPose fitted = fit_pose(device, pivot.scene(), frame, single, {&start, 1}, known, {});
+  FittedPose fitted = fit_pose(device, pivot.scene(), frame.image, single, {&start, 1}, known, {});
   if (!fitted.result.explained) {
     ++misses;
     return {.pose = pivot.to_origin(start), .loss = fitted.result.loss};
@@ -152,9 +187,11 @@ TrackedPose PoseTracker::Impl::first(const Image& frame) {
   return result(TrackStatus::found, follow_from(levels->size() - 1, seen->result.pose));
 }
 
-void PoseTracker::Impl::make_levels(const Pose& near, const Image& frame) {
+void PoseTracker::Impl::make_levels(const Pose& near, const TrackFrame& frame) {
+  const std::vector<LossScales> scales = levels ? levels->scales() : std::vector<LossScales>();
   levels.reset();  // whose memory others may take
-  levels = std::make_unique<TrackLevels>(device, pivot.scene(), pose_options(options), *seen, near, frame);
+  levels =
+      std::make_unique<TrackLevels>(device, pivot.scene(), pose_options(options), *seen, near, frame, scales);
 }
 
 /// The finest level alone where the last prediction was off by no more than a few pixels, or else from the one before:
@@ -289,6 +326,6 @@ PoseTracker::~PoseTracker() = default;
 PoseTracker::PoseTracker(PoseTracker&&) noexcept = default;
 PoseTracker& PoseTracker::operator=(PoseTracker&&) noexcept = default;
 
-TrackedPose PoseTracker::track(const Image& frame) { return impl_->track(frame); }
+TrackedPose PoseTracker::track(const TrackFrame& frame) { return impl_->track(frame); }
 
 }  // namespace dpr

@@ -5,19 +5,26 @@
 #include <memory>
 #include <vector>
 
+#include "dpr/pose_tracker.hpp"
 #include "solve/pose_level.hpp"
 #include "solve/pose_search.hpp"
 
 namespace dpr {
 
+/// The method with what was seen in a frame beside colours.
+LeastSquares observing(LeastSquares method, const TrackFrame& frame);
+
 class TrackLevels {
  public:
-  /// `first` says in which light, and by which normals, images show the object; `near` how far away it is.
+  /// `first` says in which light, and by which normals, images show the object; `near` how far away it is. `scales`
+  /// are those of other levels; without any, silhouettes and depths weigh by what `near` leaves of them.
   TrackLevels(const Device& device, const Scene& scene, const PoseOptions& options, const FittedPose& first,
-              const Pose& near, const Image& frame);
+              const Pose& near, const TrackFrame& frame, std::span<const LossScales> scales);
 
   /// The frame to look at; must stay as long as levels are asked for.
-  void set_frame(const Image& frame);
+  void set_frame(const TrackFrame& frame);
+  /// [level]
+  std::vector<LossScales> scales() const;
 
   std::size_t size() const { return levels_.size(); }
   /// From coarse to fine, with the frame at its size.
@@ -42,7 +49,7 @@ class TrackLevels {
   Camera camera_;
   double near_depth_, baseline_part_;
   std::vector<std::unique_ptr<Level>> levels_;
-  const Image* frame_;
+  const TrackFrame* frame_;
 };
 
 }  // namespace dpr

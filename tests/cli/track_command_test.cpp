@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "cli/sequence.hpp"
+#include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
@@ -42,14 +43,15 @@ double angle(int frame) { return 0.05 * (frame - k_first); }
 
 std::string frame_name(int frame) { return "frames/f" + std::to_string(frame) + ".png"; }
 
-/// scene.json, and frames/f8.png to f12.png: the cube that turns about y.
+/// scene.json, and the cube that turns about y: frames/f8.png to f12.png, masks/, and depths/ of .exr files.
 void write_inputs(const TempDir& folder) {
   dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
   folder.write(
       "scene.json",
       R"({"width": 64, "height": 48, "camera": {"view": [[1,0,0,0],[0,0.8,-0.6,0],[0,0.6,0.8,-6],[0,0,0,1]]},
                    "meshes": [{"file": "cube.ply"}]})");
-  std::filesystem::create_directory(folder / "frames");
+  for (const char* const name : {"frames", "masks", "depths"})
+    std::filesystem::create_directory(folder / name);
   dpr::Scene scene = dpr::read_scene(folder / "scene.json");
   scene.smoothing = dpr::rigid_smoothing();
   dpr::Renderer renderer(dpr::open_device());
@@ -59,7 +61,17 @@ void write_inputs(const TempDir& folder) {
                          {glm::mat4(glm::mat3(dpr::rotation_from_vector({0, angle(frame), 0})))}};
     renderer.set_views({&view, 1});
     renderer.forward();
-    dpr::write_image(folder / frame_name(frame), dpr::opaque(renderer.image()));
+    const dpr::Image image = renderer.image();
+    dpr::write_image(folder / frame_name(frame), dpr::opaque(image));
+    dpr::Image mask = image, depth = image;
+    const std::vector<float> depths = dpr::auxiliary_outputs(renderer).depth;
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      mask.pixels[i] = glm::vec4(glm::vec3(image.pixels[i].w), 1);
+      depth.pixels[i] = glm::vec4(glm::vec3(depths[i]), 1);
+    }
+    const std::string name = "/f" + std::to_string(frame);
+    dpr::write_image(folder / ("masks" + name + ".png"), mask);
+    dpr::write_image(folder / ("depths" + name + ".exr"), depth);
   }
 }
 
@@ -195,6 +207,24 @@ TEST_SUITE("pipeline") {
     CHECK(dpr::read_image(folder / "report/frames.png").width == k_frames * 256 + (k_frames - 1) * 2);
   }
 
+  TEST_CASE("dpr track: silhouettes and depths beside the frames") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    const auto found_by = [&](const std::string& options) {
+      const Outcome outcome =
+          track(folder, "--sequence frames --translation -o track.json --csv track.csv " + options);
+      CAPTURE(outcome.err);
+      REQUIRE(outcome.status == 0);
+      const json file = json::parse(folder.read("track.json"));
+      CHECK(file["lost"] == 0);
+      return std::stod(cells(lines(folder.read("track.csv")).back())[8]);
+    };
+    CHECK(std::abs(found_by("--silhouette masks --depth depths/f%d.exr")) < 0.01);
+    // Depths of a longer unit move the cube away.
+    CHECK(found_by("--depth depths --depth-scale 1.005 --depth-weight 100") < -0.01);
+  }
+
   TEST_CASE("dpr track: the frames of a video, where OpenImageIO reads any") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -298,6 +328,14 @@ TEST_SUITE("robustness") {
     check("--sequence frames --search --initial-rotation 0,0,0", "both --");
     check("--sequence frames --size 32x32", "got 64x48, expected 32x32");
     check("--sequence frames --sigma 1", "unknown option \"--sigma\"");
+    check("--sequence frames --depth-scale 1", "got no --depth");
+    check("--sequence frames --depth frames", "got whole numbers, expected --depth-scale");
+    check("--sequence frames --depth film.mp4 --depth-scale 1",
+          "--depth film.mp4 (command line): got a video");
+    check("--sequence frames --silhouette masks/f8.png",
+          "--silhouette (command line): got 1 images, expected 5");
+    check("--sequence frames --silhouette missing%d.png",
+          "--silhouette missing%d.png (command line): got no file that matches");
   }
 }
 

@@ -1,5 +1,5 @@
-// Poses in rendered sequences: of an object that moves faster and faster, that is covered, that leaves and comes back;
-// and what the tracker refuses.
+// Poses in rendered sequences: of an object that moves faster and faster, that is covered, that leaves and comes back,
+// that depths tell from its surroundings; and what the tracker refuses.
 #include "dpr/pose_tracker.hpp"
 
 #include <doctest/doctest.h>
@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "support/messages.hpp"
@@ -65,6 +66,18 @@ class Film {
     return renderer_.image();
   }
 
+  /// The image with a silhouette and depths.
+  TrackFrame seen_at(const Pose& pose) {
+    TrackFrame frame{at(pose)};
+    frame.silhouette = frame.depth = frame.image;
+    const AuxiliaryOutputs outputs = auxiliary_outputs(renderer_);
+    for (std::size_t i = 0; i < frame.image.pixels.size(); ++i) {
+      frame.silhouette.pixels[i] = glm::vec4(frame.image.pixels[i].w);
+      frame.depth.pixels[i] = glm::vec4(outputs.depth[i]);
+    }
+    return frame;
+  }
+
  private:
   Camera camera_;
   Renderer renderer_;
@@ -86,6 +99,21 @@ TrackOptions near_start() {
     options.method.coarsest = 8;
   }
   return options;
+}
+
+/// Puts what moves behind the object, stripes of all colours and a wall with depths; and a grain over all colours.
+void put_before_stripes(TrackFrame& frame, int number) {
+  for (int row = 0; row < frame.image.height; ++row) {
+    for (int column = 0; column < frame.image.width; ++column) {
+      glm::vec4& pixel = frame.image.at(column, row);
+      const float place = 0.2F * static_cast<float>(column + 3 * number) + 0.13F * static_cast<float>(row);
+      const glm::vec3 stripe(0.5F + 0.4F * std::sin(place), 0.5F + 0.4F * std::cos(1.3F * place),
+                             0.5F + 0.4F * std::sin(0.7F * place));
+      const float grain = 0.07F * std::sin(static_cast<float>(7919 * column + 104729 * row + 17 * number));
+      pixel = glm::vec4(glm::mix(stripe, glm::vec3(pixel), pixel.w) + grain, 1);
+      if (frame.silhouette.at(column, row).x < 0.5F) frame.depth.at(column, row) = glm::vec4(8);
+    }
+  }
 }
 
 }  // namespace
@@ -187,6 +215,57 @@ TEST_SUITE("pipeline") {
     CHECK(found.status == TrackStatus::found);
     CHECK(angle_degrees(found.pose.rotation, truth.rotation) < 0.8);
   }
+
+  TEST_CASE("tracker: depths hold an object before surroundings that are not known") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = body_scene(96, 3);
+    Film film(device, scene);
+    TrackOptions options = near_start();
+    options.method.robust = options.method.unknown_background = true;
+    double worst[2] = {0, 0};  // distance from the truth without depths, and with
+    for (const bool has_depth : {false, true}) {
+      PoseTracker tracker(device, scene, options);
+      for (int t = 0; t < 12; ++t) {
+        const Pose truth{rotation_from_vector({0.05 * t, 0.03 * t, 0}), glm::dvec3(0.02 * t, 0, -0.08 * t)};
+        TrackFrame frame = film.seen_at(truth);
+        put_before_stripes(frame, t);
+        frame.silhouette = {};
+        if (!has_depth) frame.depth = {};
+        const TrackedPose found = tracker.track(frame);
+        CHECK(found.status == (t == 0 ? TrackStatus::found : TrackStatus::tracked));
+        double& most = worst[has_depth ? 1 : 0];
+        most = std::max(most, glm::length(found.pose.translation - truth.translation));
+      }
+    }
+    CAPTURE(worst[0]);
+    CHECK(worst[1] < 0.02);
+    CHECK(worst[1] < 0.5 * worst[0]);
+  }
+
+  TEST_CASE("tracker: silhouettes count, and a frame may show nothing of the object") {
+    const Device device = open_device();
+    const Scene scene = body_scene(96, 3);
+    Film film(device, scene);
+    TrackOptions options = near_start();
+    options.method.silhouette.weight = 1000;  // colours are exact
+    PoseTracker tracker(device, scene, options);
+    const auto pose_at = [](int t) {
+      return Pose{rotation_from_vector({0.05 * t, 0, 0}), glm::dvec3(0.03 * t, 0, 0)};
+    };
+    for (int t = 0; t < test::reduced(4, 1); ++t) {
+      const TrackedPose found = tracker.track(film.seen_at(pose_at(t)));
+      if (test::is_reduced()) continue;
+      CHECK(found.status == (t == 0 ? TrackStatus::found : TrackStatus::tracked));
+      CHECK(angle_degrees(found.pose.rotation, pose_at(t).rotation) < 0.8);
+    }
+    TrackFrame nothing = film.seen_at(pose_at(4));
+    std::ranges::fill(nothing.silhouette.pixels, glm::vec4(0));
+    std::ranges::fill(nothing.depth.pixels, glm::vec4(0));
+    CHECK(tracker.track(nothing).status == TrackStatus::lost);
+    const TrackedPose again = tracker.track(film.seen_at(pose_at(5)));
+    if (!test::is_reduced()) CHECK(again.status == TrackStatus::found);
+  }
 }
 
 TEST_SUITE("robustness") {
@@ -200,6 +279,25 @@ TEST_SUITE("robustness") {
     Image broken = film.at({});
     broken.at(1, 1).y = std::numeric_limits<float>::quiet_NaN();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, tracker.track(broken), "frame (track): got a pixel that is not");
+    TrackFrame frame = film.seen_at({});
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, tracker.track(frame),
+                          "silhouette (track): got one, expected what");
+    PoseTracker observing(device, scene, near_start());
+    const auto refuses = [&](const char* says, auto change) {
+      TrackFrame changed = frame;
+      change(changed);
+      DPR_CHECK_MESSAGE_HAS(InvalidArgument, observing.track(changed), says);
+    };
+    refuses("pixel of the depth (track): got -1",
+            [](TrackFrame& f) { f.depth.at(1, 1) = glm::vec4(-1, 0, 0, 1); });
+    refuses("pixel of the silhouette (track): got 2", [](TrackFrame& f) { f.silhouette.at(1, 1).x = 2; });
+    refuses("size of the depth (pose): got 3x2", [](TrackFrame& f) { f.depth = Image(3, 2); });
+    observing.track(frame);
+    refuses("depth (track): got none", [](TrackFrame& f) { f.depth = {}; });
+    TrackOptions anything = near_start();
+    anything.method.robust = anything.method.unknown_background = true;
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, PoseTracker(device, scene, anything).track(frame),
+                          "silhouette (track): got one, which tells the background apart");
     const TrackedPose next = tracker.track(film.at({}));
     if (!test::is_reduced()) CHECK(first.status == TrackStatus::found);
     if (!test::is_reduced()) CHECK(next.status == TrackStatus::tracked);
