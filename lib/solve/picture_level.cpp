@@ -339,8 +339,8 @@ LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
   };
   if (has_unknown_background_) parts.uncovered = loss - without(k_coverage);
   if (counts_depths) {
-    // Depths match that leave less than this part of what quite other ones do: the scale is four deviations.
-    constexpr double k_matched = 0.2;
+    // Of what quite other depths leave: others may lie before some of the object.
+    constexpr double k_matched = 0.5;
     constexpr float k_sharper = 1e4F;
     const double others = without(k_depth);
     LossScales most = scales_;
