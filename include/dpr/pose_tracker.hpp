@@ -23,9 +23,9 @@ enum class TrackStatus {
 DPR_API LeastSquares track_least_squares();
 
 struct TrackOptions {
-  /// As for a single image, but that silhouettes and depths are the frames'. `mask` holds for every frame. `rotations` are
-  /// tried where the object is looked for everywhere, and then divided among the places where it may be. The light is
-  /// that of the first frame in which the object is found: fixed if the scene's own explains that, or else of the
+  /// As for a single image, but that silhouettes and depths are the frames'. `mask` holds for every frame. `rotations`
+  /// are tried where the object is looked for everywhere, and then divided among the places where it may be. The light
+  /// is that of the first frame in which the object is found: fixed if the scene's own explains that, or else of the
   /// asked-for kind and found anew in every frame.
   LeastSquares method = track_least_squares();
   /// The translation too. The object then turns about the middle of the mesh's bounding box.
@@ -60,8 +60,8 @@ struct TrackedPose {
   /// Object to world, as PoseResult::pose. Of a lost object the guess from which it is looked for: no result.
   Pose pose;
   /// Mean over colour channels and pixels of squared differences, linear colours, at the frame's size; robust ones as
-  /// LeastSquares::robust has them; with silhouettes and depths, weighed. Of a lost object that of the best pose that was
-  /// tried.
+  /// LeastSquares::robust has them; with silhouettes and depths, weighed. Of a lost object that of the best pose that
+  /// was tried.
   double loss = 0;
   /// The loss below which the frame counts as explained; 0 while the object has not been seen at all.
   double explained_below = 0;
@@ -81,8 +81,8 @@ struct TrackedPose {
 ///
 /// Renderers and buffers are kept: a frame that is tracked builds no kernel and seldom allocates on the device, where the
 /// object takes more room than ever before. They are made anew where the object's distance has changed by half.
-/// Silhouettes and depths weigh by what the pose in the first frame with the object leaves of them. Results are the same
-/// bits from run to run on a device. Not thread-safe; movable.
+/// Silhouettes and depths weigh by what the pose in the first frame with the object leaves of them. Results are the
+/// same bits from run to run on a device. Not thread-safe; movable.
 class DPR_API PoseTracker {
  public:
   /// Throws InvalidArgument as PoseSolver does, for a silhouette or depths of the method, and for options out of their
