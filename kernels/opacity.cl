@@ -19,8 +19,8 @@ static inline CornerOpacities load_opacities(const FrameParams p, uint view_face
   return o;
 }
 
-static inline realn opacity_at(const CornerOpacities o, float2 bounds, realn c1, realn c2) {
-  return clamp(o.base + c1 * o.along1 + c2 * o.along2, bounds.x, bounds.y);
+static inline realn opacity_at(const CornerOpacities o, const OpacityParams in_force, realn c1, realn c2) {
+  return clamp(o.base + c1 * o.along1 + c2 * o.along2, in_force.least, in_force.largest);
 }
 
 /// One work-item per group of pairs in `range`. Deterministic.
@@ -28,10 +28,8 @@ static inline realn opacity_at(const CornerOpacities o, float2 bounds, realn c1,
 /// in   fragment_starts  uint[pair + 1]  runs of fragments
 /// in   faces        uint4[...][face]    from p.opacity_faces on indices into opacities, by corner
 /// in   opacities    float4[opacity]     x in [0, 1]
-/// in   bounds       the least and the largest opacity in force: of 0 there is no logarithm, and behind a surface
-///                   of 1 nothing is looked at
 /// in out  fragments  float[plane][fragment]  LOG_OCCUPANCY and OCCUPANCY, by BARY
-kernel void opacity_forward(const FrameParams p, const float2 bounds, const uint2 range,
+kernel void opacity_forward(const FrameParams p, const OpacityParams in_force, const uint2 range,
                             global const uint* restrict pairs, global const uint* restrict pair_face,
                             global const uint* restrict fragment_starts, global const uint4* restrict faces,
                             global const float4* restrict opacities, global float* restrict fragments) {
@@ -42,10 +40,10 @@ kernel void opacity_forward(const FrameParams p, const float2 bounds, const uint
   const uint2 group = pair_group(range, pairs[0]);
   for (uint pair = group.x; pair < group.y; ++pair) {
     const CornerOpacities o = load_opacities(p, pair_face[pair], faces, opacities);
-    if (bounds.y == 1.0f && o.base == 1.0f && o.along1 == 0.0f && o.along2 == 0.0f) continue;
+    if (in_force.largest == 1.0f && o.base == 1.0f && o.along1 == 0.0f && o.along2 == 0.0f) continue;
     const uint last = fragment_starts[pair + 1];
     for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
-      const realn a = opacity_at(o, bounds, load_n(i, bary), load_n(i, bary + p.fragments));
+      const realn a = opacity_at(o, in_force, load_n(i, bary), load_n(i, bary + p.fragments));
       store_run(load_own_run(last, i, log_p) + log_n(a), i, last, log_p);
       store_run(load_own_run(last, i, occupancy) * a, i, last, occupancy);
     }
@@ -54,16 +52,16 @@ kernel void opacity_forward(const FrameParams p, const float2 bounds, const uint
 
 /// One work-item per group of pairs in `range`, after shading's backward pass and before that of occupancy.
 /// Deterministic. Inputs as opacity_forward, and
-/// in   is_sampled    1: occupancies are sampled, and their backward pass divides by what the fragments hold
-/// in out  grads      float[plane][fragment]  BARY, to which it adds, by LOG_OCCUPANCY; and, sampled, this
+/// in out  grads      float[plane][fragment]  BARY, to which it adds, by LOG_OCCUPANCY; and, sampled, this, by
+///                                            opacities of textures that lie in DISTANCE, if there are any
 /// out  grad_opacities  float[pair][9]        of the corners' opacities in the first of three each
-kernel void opacity_backward(const FrameParams p, const float2 bounds, const uint2 range,
-                             const uint is_sampled, global const uint* restrict pairs,
-                             global const uint* restrict pair_face,
+kernel void opacity_backward(const FrameParams p, const OpacityParams in_force, const uint2 range,
+                             global const uint* restrict pairs, global const uint* restrict pair_face,
                              global const uint* restrict fragment_starts, global const uint4* restrict faces,
                              global const float4* restrict opacities, global const float* restrict fragments,
                              global float* restrict grads, global float* restrict grad_opacities) {
   global const float* const bary = fragments + DPR_PLANE(p, BARY);
+  global const float* const texture_opacities = grads + DPR_GRAD_PLANE(p, DISTANCE);
   global float *const grad_bary = grads + DPR_GRAD_PLANE(p, BARY), *const grad_log =
                                                                        grads +
                                                                        DPR_GRAD_PLANE(p, LOG_OCCUPANCY);
@@ -75,7 +73,7 @@ kernel void opacity_backward(const FrameParams p, const float2 bounds, const uin
     for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
       const intn in_run = lanes_before(last, i);
       const realn c1 = load_run(in_run, i, bary), c2 = load_run(in_run, i, bary + p.fragments);
-      const realn a = opacity_at(o, bounds, c1, c2), by_log = load_own_run(last, i, grad_log),
+      const realn a = opacity_at(o, in_force, c1, c2), by_log = load_own_run(last, i, grad_log),
                   grad = by_log / a;
       sum0 += (1.0f - c1 - c2) * grad;
       sum1 += c1 * grad;
@@ -83,7 +81,10 @@ kernel void opacity_backward(const FrameParams p, const float2 bounds, const uin
       store_run(load_own_run(last, i, grad_bary) + o.along1 * grad, i, last, grad_bary);
       store_run(load_own_run(last, i, grad_bary + p.grad_fragments) + o.along2 * grad, i, last,
                 grad_bary + p.grad_fragments);
-      if (is_sampled) store_run(by_log * a, i, last, grad_log);
+      if (in_force.is_sampled) {
+        const realn all = in_force.is_textured ? a * load_own_run(last, i, texture_opacities) : a;
+        store_run(by_log * all, i, last, grad_log);
+      }
     }
     vstore3((float3)(sum_lanes(sum0), 0.0f, 0.0f), 0, grad_opacities + 9 * pair);
     vstore3((float3)(sum_lanes(sum1), 0.0f, 0.0f), 1, grad_opacities + 9 * pair);
@@ -96,7 +97,7 @@ kernel void opacity_backward(const FrameParams p, const float2 bounds, const uin
 /// in   moving      how many opacities a direction has; 0: none changes
 /// in   opacity_tangents  float4[direction][opacity]
 /// in out  tangents  float[direction][q.planes][fragment]  LOG_OCCUPANCY, to which it adds
-kernel void opacity_tangent(const FrameParams p, const float2 bounds, const uint2 range,
+kernel void opacity_tangent(const FrameParams p, const OpacityParams in_force, const uint2 range,
                             const TangentParams q, const uint moving, global const uint* restrict pairs,
                             global const uint* restrict pair_face,
                             global const uint* restrict fragment_starts, global const uint4* restrict faces,
@@ -119,7 +120,7 @@ kernel void opacity_tangent(const FrameParams p, const float2 bounds, const uint
         const realn b1 = load_run(in_run, i, of + DPR_GRAD_PLANE(p, BARY));
         const realn b2 = load_run(in_run, i, of + DPR_GRAD_PLANE(p, BARY) + p.grad_fragments);
         const realn moved = m.base + c1 * m.along1 + c2 * m.along2 + b1 * o.along1 + b2 * o.along2;
-        store_run(load_own_run(last, i, by_log) + moved / opacity_at(o, bounds, c1, c2), i, last, by_log);
+        store_run(load_own_run(last, i, by_log) + moved / opacity_at(o, in_force, c1, c2), i, last, by_log);
       }
     }
   }

@@ -158,6 +158,13 @@ typedef struct OccupancyParams {
   uint fragments, grad_fragments; /* as in FrameParams */
 } OccupancyParams;
 
+/// Opacities in force.
+typedef struct OpacityParams {
+  float least, largest; /* of 0 there is no logarithm, and behind a surface of 1 nothing is looked at */
+  uint is_sampled;      /* 1: occupancies are, and their backward pass divides by what the fragments hold */
+  uint is_textured;     /* 1: textures have some */
+} OpacityParams;
+
 /// The perturbation of depths, and what a pixel's colour is made of.
 typedef struct AggregateParams {
   float4 background;

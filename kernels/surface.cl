@@ -1,7 +1,6 @@
 // Base colours of the fragments of textured scenes: the corners' colours, interpolated, times the texture.
 // Shading interpolates the colours itself where no mesh has a texture.
-#include "planes.h"
-#include "texture.h"
+#include "surface_texels.h"
 
 /// One work-item per pair, up to p.last_pair. Deterministic.
 /// in   pairs            uint[1]         how many there are
@@ -39,46 +38,6 @@ kernel void surface_forward(const FrameParams p, global const uint* restrict pai
   }
 }
 
-/// Gradients of a level of detail's barycentrics, relative to corner 0's, and of the corners' places, q_k and
-/// depths, from that of the place's step, which is the sum of c_k' place_k. Depths change q_k too:
-/// depths_by_steps().
-typedef struct {
-  float bary1, bary2;
-  float3 along;  // of place_k by the gradient of the step: c_k'
-  float3 q, depth;
-} DetailGradient;
-
-static inline DetailGradient detail_backward(const TexturedFace* f, const Detail d, float c1, float c2,
-                                             float2 grad_step) {
-  const float along1 = dot(grad_step, f->place1), along2 = dot(grad_step, f->place2);
-  // Not by ?:, which would choose between two places and so put them into memory.
-  const float3 q = select(f->steps.q_x, f->steps.q_y, (int3)(-d.along_y));
-  const float sum_q = q.x + q.y + q.z;
-  const float3 depth = f->steps.depth, c = (float3)(1.0f - c1 - c2, c1, c2);
-  const float mean = c1 * along1 + c2 * along2;
-  const float by_depth = along1 * q.y + along2 * q.z - mean * sum_q;
-  DetailGradient g;
-  g.bary1 = (depth.y - depth.x) * by_depth - d.depth * along1 * sum_q;
-  g.bary2 = (depth.z - depth.x) * by_depth - d.depth * along2 * sum_q;
-  g.along = d.depth * (q - c * sum_q);
-  g.along.x = -(g.along.y + g.along.z);
-  g.q = d.depth * ((float3)(0.0f, along1, along2) - mean);
-  g.depth = c * by_depth;
-  return g;
-}
-
-/// Gradients of depths from those of q_k along x and y: on the screen q_k is divided by the depth z_k. A
-/// clipped face has q_k of its homogeneous corners, without depths.
-static inline float3 depths_by_steps(const TexturedFace* f, float3 grad_x, float3 grad_y) {
-  if (f->is_clipped) return 0.0f;
-  return -(grad_x * f->steps.q_x + grad_y * f->steps.q_y) / f->steps.depth;
-}
-
-/// The gradients of base colours, which are those of colours where no light falls on them.
-static inline uint base_plane(const FrameParams p) {
-  return (p.has_base ? DPR_GRAD_PLANE_BASE : DPR_PLANE_COLOR) * p.grad_fragments;
-}
-
 /// One work-item per pair, up to p.last_pair. Deterministic. Inputs as surface_forward, and
 /// in out  grads  float[plane][fragment]  of BARY by that of the base colours; where p.has_base is set, added
 ///                to what the light has left
@@ -99,8 +58,7 @@ kernel void surface_backward(const FrameParams p, global const uint* restrict pa
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const TexturedFace face = load_face(scene, p, pair_face[pair]);
   float3 color[3] = {0.0f, 0.0f, 0.0f};
-  float2 place[3] = {0.0f, 0.0f, 0.0f};
-  float3 steps[3] = {0.0f, 0.0f, 0.0f};
+  PlaceSums sums = {{0.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 0.0f}};
   for (uint i = fragment_starts[pair]; i < fragment_starts[pair + 1]; ++i) {
     const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments],
                 c0 = 1.0f - c1 - c2;
@@ -110,37 +68,22 @@ kernel void surface_backward(const FrameParams p, global const uint* restrict pa
     const float3 grad_color = grad * sample.color.xyz,
                  grad_sample = grad * base_of_corners(&face, c1, c2).xyz;
     const float2 grad_place = (float2)(dot(grad_sample, sample.by_x.xyz), dot(grad_sample, sample.by_y.xyz));
-    float along1 = dot(grad_color, face.color1.xyz) + dot(grad_place, face.place1);
-    float along2 = dot(grad_color, face.color2.xyz) + dot(grad_place, face.place2);
-    if (detail.varies) {
-      const float2 grad_step = dot(grad_sample, sample.by_detail.xyz) * detail.by_step;
-      const DetailGradient g = detail_backward(&face, detail, c1, c2, grad_step);
-      along1 += g.bary1;
-      along2 += g.bary2;
-      place[0] += g.along.x * grad_step;
-      place[1] += g.along.y * grad_step;
-      place[2] += g.along.z * grad_step;
-      steps[0] += detail.along_y ? (float3)(0.0f) : g.q;
-      steps[1] += detail.along_y ? g.q : (float3)(0.0f);
-      steps[2] += g.depth;
-    }
+    float along1 = dot(grad_color, face.color1.xyz), along2 = dot(grad_color, face.color2.xyz);
+    add_fragment(&face, detail, c1, c2, grad_place, dot(grad_sample, sample.by_detail.xyz), &sums, &along1,
+                 &along2);
     const uint at1 = i + DPR_GRAD_PLANE(p, BARY), at2 = at1 + p.grad_fragments;
     grads[at1] = p.has_base ? grads[at1] + along1 : along1;
     grads[at2] = p.has_base ? grads[at2] + along2 : along2;
     color[0] += c0 * grad_color;
     color[1] += c1 * grad_color;
     color[2] += c2 * grad_color;
-    place[0] += c0 * grad_place;
-    place[1] += c1 * grad_place;
-    place[2] += c2 * grad_place;
   }
-  if (face.texture.levels > 1) steps[2] += depths_by_steps(&face, steps[0], steps[1]);
+  finish_steps(&face, &sums);
   for (size_t k = 0; k < 3; ++k) {
     vstore3(color[k], k, grad_pairs + DPR_PAIR_COLORS * (size_t)p.pairs + 9 * pair);
-    vstore3((float3)(place[k].x, -place[k].y, 0.0f), k,
-            grad_pairs + DPR_PAIR_TEXCOORDS * (size_t)p.pairs + 9 * pair);
+    vstore3(place_gradient(sums, k), k, grad_pairs + DPR_PAIR_TEXCOORDS * (size_t)p.pairs + 9 * pair);
     if (face.texture.levels > 1)
-      vstore3(steps[k], k, grad_pairs + DPR_PAIR_STEPS * (size_t)p.pairs + 9 * pair);
+      vstore3(sums.steps[k], k, grad_pairs + DPR_PAIR_STEPS * (size_t)p.pairs + 9 * pair);
   }
 }
 
@@ -247,20 +190,7 @@ kernel void surface_list(const FrameParams p, global const uint* restrict pairs,
     const Detail detail = find_detail(p, &face, c1, c2);
     const float3 grad =
         load_planes(i + base_plane(p), p.grad_fragments, grads) * base_of_corners(&face, c1, c2).xyz;
-    const Footprint footprint = find_footprint(face.texture, (uint)detail.level, place_at(&face, c1, c2));
-    const uint2 cell = footprint_cells(footprint);
-    for (uint k = 0; k < p.levels; ++k) {
-      const uint place = p.levels * i + k;
-      const int is_seen = face.is_textured && k < face.texture.levels;
-      const float3 of_level = (k == 0 ? 1.0f - detail.part : detail.part) * grad;
-      const float2 part = k == 0 ? footprint.part.xy : footprint.part.zw;
-      cells[place] = !is_seen ? p.texels : k == 0 ? cell.x : cell.y;
-      seen[place].red = of_level.x;
-      seen[place].green = of_level.y;
-      seen[place].blue = of_level.z;
-      seen[place].right = part.x;
-      seen[place].below = part.y;
-    }
+    list_fragment(p, &face, detail, i, c1, c2, grad, cells, seen);
   }
 }
 
@@ -276,11 +206,6 @@ kernel void surface_place(const FrameParams p, global const uint* restrict fragm
   const uint i = (uint)get_global_id(0), last = p.levels * fragment_starts[p.last_pair];
   if (i == 0) places[0] = last;
   if (i < last) seen[i].tile = pair_tile[fragment_pair[i / p.levels]];
-}
-
-/// Derivatives of base colours with respect to their levels of detail, behind the last direction's tangents.
-static inline global float* details_of(const FrameParams p, const TangentParams q, global float* tangents) {
-  return tangents + (size_t)q.directions * q.planes * p.grad_fragments;
 }
 
 /// Tangents of base colours by those of barycentrics and of the corners' colours. One work-item per

@@ -71,14 +71,10 @@ static inline Steps clipped_steps(const ClippedFace c) {
 
 static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0f - texcoord.y); }
 
-static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, uint view_face) {
-  const uint view = view_face / p.faces, face = view_face - view * p.faces;
-  const uint4 c = s.faces[p.color_faces + face] + view * p.color_stride,
-              corner = s.faces[p.texcoord_faces + face];
+/// Without the colours.
+static inline TexturedFace load_place(const SurfaceScene s, const FrameParams p, uint view_face) {
+  const uint4 corner = s.faces[p.texcoord_faces + view_face % p.faces];
   TexturedFace f;
-  f.color = s.colors[c.x];
-  f.color1 = s.colors[c.y] - f.color;
-  f.color2 = s.colors[c.z] - f.color;
   f.is_textured = corner.w != DPR_NO_TEXTURE;
   f.texture = s.textures[f.is_textured ? corner.w : 0];
   f.is_clipped = p.clips && s.clipped[view_face].corners != 0;
@@ -92,6 +88,16 @@ static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, 
   if (f.texture.levels > 1) {
     f.steps = f.is_clipped ? clipped_steps(s.clipped[view_face]) : triangle_steps(p, s.triangles[view_face]);
   }
+  return f;
+}
+
+static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, uint view_face) {
+  const uint view = view_face / p.faces;
+  const uint4 c = s.faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  TexturedFace f = load_place(s, p, view_face);
+  f.color = s.colors[c.x];
+  f.color1 = s.colors[c.y] - f.color;
+  f.color2 = s.colors[c.z] - f.color;
   return f;
 }
 

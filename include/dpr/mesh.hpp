@@ -52,7 +52,8 @@ struct Mesh {
   /// The probability that a surface is there where it may cover a pixel, from 0 to 1: at most one of the two is
   /// filled; with neither it is opaque. Below 1 it needs noise of the triangles (Noise::triangle), exact where the
   /// composition is joint, and frames take longer: nothing is hidden. Images count 0 as 1e-6 (barrier:
-  /// 1e-20), and where the gradient is asked for 1 as 1 - 1e-6, so that both have theirs.
+  /// 1e-20), and where the gradient is asked for 1 as 1 - 1e-6, so that both have theirs. Those of textures multiply
+  /// them.
   std::vector<float> vertex_opacities{};  ///< [vertex], or empty
   std::vector<float> face_opacities{};    ///< [face], or empty
 };
@@ -66,17 +67,18 @@ DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 /// triangle fans; non-manifold, duplicate and degenerate faces are kept, and the colours of vertices, else of
 /// faces, white where others have one; dpr/notes.hpp tells what is left out.
 ///
-/// OBJ: the diffuse colours of materials are face colours, their textures (map_Kd) are the mesh's, and what they
-/// say of highlights (Ks, Ns, illum) its materials, if libraries and textures are regular files. Normals are kept
-/// if every corner has one, texture coordinates (u, v; v up) if every corner has some, or where there are
+/// OBJ: the diffuse colours of materials are face colours, their textures (map_Kd, without alpha) are the mesh's, and
+/// what they say of highlights (Ks, Ns, illum) its materials, if libraries and textures are regular files. Normals are
+/// kept if every corner has one, texture coordinates (u, v; v up) if every corner has some, or where there are
 /// textures; then faces without coordinates get (0, 0) and no texture.
-/// PLY: textures (comment TextureFile) take the place of colours, by the corners' or else the vertices'
+/// PLY: textures (comment TextureFile, without alpha) take the place of colours, by the corners' or else the vertices'
 /// coordinates; normals and texture coordinates are kept if they are floats.
 /// STL: equal positions become one, and facets with two equal corners are left out.
 /// glTF: all meshes of the scene to show, where their nodes place them, as one; equal positions become one
-/// unless there are colours of vertices. Base colours are colours, their textures (PNG and JPEG, also within
-/// the file) the mesh's; of what else a surface is, nothing is read. Normals and texture coordinates are kept if
-/// all triangles have them.
+/// unless there are colours or opacities of vertices. Base colours are colours, their textures (PNG and JPEG, also
+/// within the file) the mesh's; alpha is opacity where alphaMode is BLEND, an opacity of 0 or 1 by alphaCutoff where it
+/// is MASK; of what else a surface is, nothing is read. Normals and texture coordinates are kept if all triangles have
+/// them.
 ///
 /// Throws IoError where the file is missing, malformed, truncated, goes on after its end or has none; and
 /// InvalidArgument where its content cannot be rendered.

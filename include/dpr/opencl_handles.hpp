@@ -102,6 +102,11 @@ inline void set_opacities(Renderer& renderer, std::size_t mesh, const BufferSpan
                           const Events& events = {}) {
   set_array(renderer, {ArrayId::opacities, mesh}, opacities, events);
 }
+/// [height * width] of a texture that has some; from 0 to 1, which is not checked.
+inline void set_texel_opacities(Renderer& renderer, std::size_t mesh, std::size_t texture,
+                                const BufferSpan& opacities, const Events& events = {}) {
+  set_array(renderer, {ArrayId::texel_opacities, mesh, texture}, opacities, events);
+}
 /// Renderer::set_shapes(): [view][vertex] and [view][color] of three floats. One without a buffer is the
 /// scene's.
 DPR_API void set_shapes(Renderer& renderer, const BufferSpan& positions, const BufferSpan& colors,

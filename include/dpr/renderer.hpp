@@ -60,6 +60,8 @@ struct MeshGradient {
   std::vector<vec3> specular{};     ///< [material]
   std::vector<double> shininess{};  ///< [material] of the exponent in force, the material's or the lights'
   std::vector<float> opacities{};   ///< [vertex] or [face], as the mesh has them; empty if not requested
+  /// [texture][height * width]; empty of a texture without, and if not requested
+  std::vector<std::vector<float>> texel_opacities{};
 };
 
 /// Gradients of the views' own shapes (Renderer::set_shapes), object space; empty where views share the
@@ -105,9 +107,9 @@ struct RenderStatistics {
 };
 
 /// Arrays of meshes that setters replace and backward passes differentiate.
-enum class ArrayId { positions, colors, texels, texcoords, normals, materials, opacities };
+enum class ArrayId { positions, colors, texels, texcoords, normals, materials, opacities, texel_opacities };
 
-/// An array of a mesh of the scene, or the texels of one of its textures.
+/// An array of a mesh of the scene, or of one of its textures.
 struct ArrayRef {
   ArrayId id;
   std::size_t mesh = 0, texture = 0;
@@ -147,6 +149,10 @@ class ArraySetters {
   /// From 0 to 1, for a mesh that has some: [vertex] or [face]. Below 1 they need noise of the triangles.
   void set_opacities(std::size_t mesh, std::span<const float> opacities) {
     set({ArrayId::opacities, mesh}, opacities);
+  }
+  /// The same of a texture that has some: [height * width].
+  void set_texel_opacities(std::size_t mesh, std::size_t texture, std::span<const float> opacities) {
+    set({ArrayId::texel_opacities, mesh, texture}, opacities);
   }
 
  private:

@@ -44,6 +44,7 @@ struct GradientRequest {
   bool normals = false;     ///< normals that meshes give; 0 without lights
   bool materials = false;   ///< coefficients of the materials that meshes give; 0 without lights
   bool opacities = false;   ///< vertex or face opacities
+  bool texel_opacities = false;  ///< of textures that have some
 
   bool operator==(const GradientRequest&) const = default;
 };

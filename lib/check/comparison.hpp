@@ -113,6 +113,10 @@ inline void add_textures(const Mesh& mesh, reference::Mesh& result) {
     result.textures.push_back({t.width, t.height, to_reference(t.texels),
                                static_cast<reference::Wrap>(t.wrap),
                                static_cast<reference::Filter>(t.filter)});
+    reference::Texture opacities = result.textures.back();
+    opacities.texels.clear();
+    for (const float a : t.opacities) opacities.texels.push_back(to_reference(glm::vec3(a)));
+    result.opacity_textures.push_back(opacities);
   }
   for (const std::uint32_t texture : mesh.face_textures)
     result.face_textures.push_back(texture == k_no_texture ? -1 : static_cast<int>(texture));
@@ -226,6 +230,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found) {
     if (!found.meshes[m].texcoords.empty()) add("texcoords", flat(found.meshes[m].texcoords));
     const std::vector<float>& opacities = found.meshes[m].opacities;
     if (!opacities.empty()) add("opacities", {opacities.begin(), opacities.end()});
+    for (const std::vector<float>& texels : found.meshes[m].texel_opacities)
+      if (!texels.empty()) add("texel opacities", {texels.begin(), texels.end()});
     for (const std::vector<glm::vec3>& texels : found.meshes[m].textures) add("texels", flat(texels));
     const PoseGradient& pose = found.views[0].transforms[m];
     add("rotation", flat<glm::dvec3>({pose.rotation}));
@@ -262,6 +268,8 @@ inline std::vector<Block> blocks_of(const SceneGradient& found, const reference:
     set(flat(mesh.colors));
     if (!mesh.texcoords.empty()) set(flat(mesh.texcoords));
     if (!mesh.opacities.empty()) set(mesh.opacities);
+    for (const std::vector<double>& texels : mesh.texel_opacities)
+      if (!texels.empty()) set(texels);
     for (const std::vector<reference::Vec3d>& texels : mesh.textures) set(flat(texels));
     set(flat<reference::Vec3d>({mesh.rotation}));
     set(flat<reference::Vec3d>({mesh.translation}));

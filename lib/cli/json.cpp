@@ -72,12 +72,6 @@ void add_found_light(Json& json, const Lights& light) {
   json["lights"] = {{"ambient", to_json(glm::dvec3(light.ambient))}, {"harmonics", harmonics}};
 }
 
-Json to_json(const std::vector<std::vector<glm::vec3>>& lists) {
-  Json all = Json::array();
-  for (const std::vector<glm::vec3>& list : lists) all.push_back(to_json(list));
-  return all;
-}
-
 Json rows_to_json(const glm::dmat3& matrix) {
   Json rows = Json::array();
   for (int row = 0; row < 3; ++row) {

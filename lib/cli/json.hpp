@@ -22,7 +22,12 @@ Json to_json(const std::vector<glm::vec3>& vectors);
 Json to_json(const std::vector<glm::vec2>& vectors);
 Json to_json(const std::vector<double>& numbers);
 Json to_json(const std::vector<float>& numbers);
-Json to_json(const std::vector<std::vector<glm::vec3>>& lists);
+template <class Element>
+Json to_json(const std::vector<std::vector<Element>>& lists) {
+  Json json = Json::array();
+  for (const std::vector<Element>& list : lists) json.push_back(to_json(list));
+  return json;
+}
 /// Adds a distant light that was found: its "harmonics", and "lights" as a scene takes them.
 void add_found_light(Json& json, const Lights& light);
 /// A list of rows.

@@ -114,12 +114,16 @@ Texture texture_of(const Image& image) {
   texture.width = image.width;
   texture.height = image.height;
   texture.texels.assign(image.pixels.begin(), image.pixels.end());
+  if (std::ranges::any_of(image.pixels, [](const glm::vec4& pixel) { return pixel.a < 1; })) {
+    for (const glm::vec4& pixel : image.pixels) texture.opacities.push_back(glm::clamp(pixel.a, 0.0F, 1.0F));
+  }
   return texture;
 }
 
 Image image_of(const Texture& texture) {
   Image image(texture.width, texture.height);
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = glm::vec4(texture.texels[i], 1);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = glm::vec4(texture.texels[i], texture.opacities.empty() ? 1 : texture.opacities[i]);
   return image;
 }
 

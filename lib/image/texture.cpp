@@ -38,6 +38,12 @@ void validate(const Texture& texture, const std::string& name) {
     throw InvalidArgument(checks::in(checks::element("texels", i), name), checks::text(texture.texels[i]),
                           "finite numbers");
   }
+  if (!texture.opacities.empty() && texture.opacities.size() != texture.texels.size())
+    throw InvalidArgument(checks::in("opacities", name), std::to_string(texture.opacities.size()),
+                          std::to_string(texture.texels.size()) + ", one for each texel, or none");
+  for (std::size_t i = 0; i < texture.opacities.size(); ++i)
+    checks::require_opacity(texture.opacities[i],
+                            [&] { return checks::in(checks::element("opacities", i), name); });
 }
 
 }  // namespace dpr

@@ -7,8 +7,10 @@
 
 namespace dpr {
 
-/// True if it gives opacities, of whatever size.
+/// True if it gives opacities of vertices or faces, of whatever size.
 bool has_opacities(const Mesh& mesh);
+/// True if a texture does.
+bool has_texel_opacities(const Mesh& mesh);
 
 /// True if some opacity is below 1.
 bool is_see_through(const Mesh& mesh);

@@ -323,6 +323,7 @@ class ObjReader {
     }
     maps_.push_back(material);
     mesh.textures.push_back(read_texture(material.texture_file));
+    mesh.textures.back().opacities.clear();
     mesh.textures.back().wrap = material.wrap;
     return static_cast<std::uint32_t>(maps_.size() - 1);
   }

@@ -154,6 +154,7 @@ void take_textures(const std::filesystem::path& file, const PlyHeader& header, P
     if (is_there && !mesh.face_texcoords.empty()) {
       known.push_back(static_cast<std::uint32_t>(mesh.textures.size()));
       mesh.textures.push_back(read_texture(path));
+      mesh.textures.back().opacities.clear();
       continue;
     }
     known.push_back(k_no_texture);

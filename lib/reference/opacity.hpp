@@ -20,35 +20,53 @@ inline Vec3d corner_opacities(const Mesh& mesh, std::size_t face) {
   return {mesh.vertex_opacities[f[0]], mesh.vertex_opacities[f[1]], mesh.vertex_opacities[f[2]]};
 }
 
-/// No more than 1, which the weights' rounding would make it.
-inline double opacity_at(const Vec3d& corners, const Vec3d& barycentric) {
-  return std::min(dot(corners, barycentric), 1.0);
+/// Opacity as if it were a base colour, three times the same: the corners' times that of the texture.
+inline BaseColor opacity_base(BaseColor base, const Mesh& mesh, std::size_t face) {
+  const Vec3d corners = corner_opacities(mesh, face);
+  for (std::size_t i = 0; i < 3; ++i) base.corners[i] = {corners[i], corners[i], corners[i]};
+  const int texture = face_texture(mesh, face);
+  base.texture = texture < 0 ? nullptr : &mesh.opacity_textures[static_cast<std::size_t>(texture)];
+  if (base.texture && base.texture->texels.empty()) base.texture = nullptr;
+  return base;
 }
 
-inline Occupancy opacity_forward(const Occupancy& of_surface, const Vec3d& corners,
+/// No more than 1, which the weights' rounding would make it.
+inline double opacity_at(const BaseColor& base, const Vec3d& barycentric) {
+  return std::min(base_color(base, barycentric).x, 1.0);
+}
+
+inline Occupancy opacity_forward(const Occupancy& of_surface, const BaseColor& base,
                                  const Vec3d& barycentric) {
-  const double opacity = opacity_at(corners, barycentric);
+  const double opacity = opacity_at(base, barycentric);
   return {opacity * of_surface.p, of_surface.log_p + std::log(opacity)};
 }
 
 struct OpacityGradient {
-  double p = 0.0, log_p = 0.0;  ///< of the surface's
-  Vec3d corners, barycentric;
+  double p = 0.0, log_p = 0.0;    ///< of the surface's
+  ShadeFragmentGradient surface;  ///< in the first of three
 };
 
-inline OpacityGradient opacity_backward(const Occupancy& of_surface, const Vec3d& corners,
+inline OpacityGradient opacity_backward(const Occupancy& of_surface, const BaseColor& base,
                                         const Vec3d& barycentric, double grad_p, double grad_log_p) {
-  const double opacity = opacity_at(corners, barycentric),
-               grad = grad_p * of_surface.p + grad_log_p / opacity;
-  return {opacity * grad_p, grad_log_p, grad * barycentric, grad * corners};
+  const double opacity = opacity_at(base, barycentric);
+  OpacityGradient grad{opacity * grad_p, grad_log_p, {}};
+  base_color_backward(base, barycentric, {grad_p * of_surface.p + grad_log_p / opacity, 0.0, 0.0},
+                      grad.surface);
+  return grad;
 }
 
-/// Adds the gradient of a face's corners to that of the mesh's opacities.
-inline void add_opacity_gradient(const Mesh& mesh, std::size_t face, const Vec3d& corners,
-                                 std::vector<double>& grad) {
-  if (!mesh.face_opacities.empty()) grad[face] += corners.x + corners.y + corners.z;
-  for (std::size_t i = 0; i < 3 && !mesh.vertex_opacities.empty(); ++i)
-    grad[mesh.faces[face][i]] += corners[i];
+/// Adds the gradient of a face's opacity to its mesh's.
+template <class MeshGradient>
+void add_opacity_gradient(const Mesh& mesh, std::size_t face, const ShadeFragmentGradient& surface,
+                          MeshGradient& grad) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!mesh.face_opacities.empty()) grad.opacities[face] += surface.corners[i].x;
+    if (!mesh.vertex_opacities.empty()) grad.opacities[mesh.faces[face][i]] += surface.corners[i].x;
+  }
+  if (surface.texels.empty()) return;
+  std::vector<double>& texels = grad.texel_opacities[static_cast<std::size_t>(face_texture(mesh, face))];
+  for (std::size_t i = 0; i < texels.size(); ++i) texels[i] += surface.texels[i].x;
+  for (std::size_t i = 0; i < 3; ++i) grad.texcoords[mesh.face_texcoords[face][i]] += surface.texcoords[i];
 }
 
 }  // namespace dpr::reference

@@ -28,6 +28,7 @@ struct MeshGradient {
   std::vector<Vec2d> texcoords;
   std::vector<std::vector<Vec3d>> textures;  ///< texels of each
   std::vector<double> opacities{};           ///< follows vertex_opacities or face_opacities
+  std::vector<std::vector<double>> texel_opacities{};
 };
 
 struct CameraGradient {
@@ -184,12 +185,6 @@ inline CornerColors corner_colors(const Scene& scene, const PreparedScene& prepa
   return corners;
 }
 
-/// The texture of a face of a mesh; -1: none.
-inline int face_texture(const Mesh& mesh, std::size_t face) {
-  if (mesh.textures.empty()) return -1;
-  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
-}
-
 inline BaseColor base_of_face(const Scene& scene, const PreparedScene& prepared, std::size_t face) {
   const std::size_t m = prepared.face_mesh[face];
   const Mesh& mesh = scene.meshes[m];
@@ -221,9 +216,9 @@ inline Occupancy surface_occupancy(const Smoothing& s, const Fragment& fragment)
   return occupancy_forward(s.occupancy_prior, fragment.distance, s.sigma);
 }
 
-inline Vec3d corner_opacities(const Scene& scene, const PreparedScene& prepared, std::size_t face) {
+inline BaseColor opacity_of_face(const Scene& scene, const PreparedScene& prepared, std::size_t face) {
   const std::size_t m = prepared.face_mesh[face];
-  return corner_opacities(scene.meshes[m], face - prepared.first_face[m]);
+  return opacity_base(base_of_face(scene, prepared, face), scene.meshes[m], face - prepared.first_face[m]);
 }
 
 /// Occupancies and colours of a pixel's fragments: what aggregation takes.
@@ -233,7 +228,7 @@ inline std::vector<FragmentInput> aggregate_inputs(const Scene& scene, const Pre
   for (const Fragment& fragment : fragments) {
     const Occupancy occupancy =
         opacity_forward(surface_occupancy(scene.smoothing, fragment),
-                        corner_opacities(scene, prepared, fragment.face), fragment.barycentric);
+                        opacity_of_face(scene, prepared, fragment.face), fragment.barycentric);
     const Vec3d color = shade_forward(prepared.shade, fragment.face, fragment.barycentric,
                                       base_of_face(scene, prepared, fragment.face));
     inputs.push_back({fragment.depth, occupancy.p, occupancy.log_p, color});
@@ -299,11 +294,11 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
     const Fragment& fragment = fragments[k];
     const FragmentInputGradient& input = aggregate.fragments[k];
     const OpacityGradient opacity =
-        opacity_backward(surface_occupancy(s, fragment), corner_opacities(scene, prepared, fragment.face),
+        opacity_backward(surface_occupancy(s, fragment), opacity_of_face(scene, prepared, fragment.face),
                          fragment.barycentric, input.occupancy, input.log_occupancy);
     const std::size_t m = prepared.face_mesh[fragment.face];
-    add_opacity_gradient(scene.meshes[m], fragment.face - prepared.first_face[m], opacity.corners,
-                         grad.meshes[m].opacities);
+    add_opacity_gradient(scene.meshes[m], fragment.face - prepared.first_face[m], opacity.surface,
+                         grad.meshes[m]);
     const OccupancyGradient occupancy =
         occupancy_backward(s.occupancy_prior, fragment.distance, s.sigma, opacity.p, opacity.log_p);
     grad.sigma += occupancy.sigma;
@@ -312,7 +307,7 @@ inline void pixel_backward(const Scene& scene, const PreparedScene& prepared, in
                        base_of_face(scene, prepared, fragment.face), input.color, sums.shade);
     add_color_gradient(scene, prepared, fragment.face, shade, grad);
     const FragmentGradient grad_fragment{occupancy.distance, input.depth,
-                                         shade.barycentric + opacity.barycentric};
+                                         shade.barycentric + opacity.surface.barycentric};
     const bool clips = is_clipped(prepared, fragment.face);
     NdcTriangle corners;
     if (clips) {
@@ -380,6 +375,8 @@ inline Gradients gradient(const Scene& scene, const Image& grad_image) {
     for (const Texture& texture : mesh.textures)
       grad.meshes.back().textures.emplace_back(texture.texels.size());
     grad.meshes.back().opacities.resize(mesh.vertex_opacities.size() + mesh.face_opacities.size());
+    for (const Texture& texture : mesh.opacity_textures)
+      grad.meshes.back().texel_opacities.emplace_back(texture.texels.size());
   }
   PixelSums sums{std::vector<Vec3d>(prepared.vertices.size()),
                  std::vector<Vec3d>(prepared.vertices.size()),

@@ -28,6 +28,7 @@ struct Mesh {
   std::vector<std::size_t> face_materials{};  ///< one per face; empty: all faces have the first
   std::vector<double> vertex_opacities{};     ///< one per vertex, or empty
   std::vector<double> face_opacities{};       ///< one per face, or empty; without any the mesh is opaque
+  std::vector<Texture> opacity_textures{};    ///< one per texture, three times the same; no texels: opaque
 };
 
 struct Smoothing {
@@ -52,6 +53,12 @@ struct Scene {
   Smoothing smoothing;
   bool perspective_correct = true;
 };
+
+/// The texture of a face of a mesh; -1: none.
+inline int face_texture(const Mesh& mesh, std::size_t face) {
+  if (mesh.textures.empty()) return -1;
+  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+}
 
 /// Empty where no mesh has materials or normals of its own.
 inline std::vector<FaceLook> face_looks(const Scene& scene) {

@@ -69,6 +69,7 @@ struct DeviceArray {
   static Buffer<cl_float4>& normals(Geometry& g) { return g.given_normals.values; }
   static Buffer<cl_float4>& materials(Geometry& g) { return g.materials.values; }
   static Buffer<cl_float4>& opacities(Geometry& g) { return g.opacities.values; }
+  static Buffer<cl_float4>& texel_opacities(Geometry& g) { return g.textures.opacities; }
 };
 
 /// The gradients of them that a backward pass leaves.
@@ -80,12 +81,18 @@ struct Gradients {
   static const Buffer<cl_float4>& normals(const Impl& m) { return m.shade.grad_given_normals; }
   static const Buffer<cl_float4>& materials(const Impl& m) { return m.grad_materials; }
   static const Buffer<cl_float4>& opacities(const Impl& m) { return m.grad_opacities; }
+  static const Buffer<cl_float4>& texel_opacities(const Impl& m) { return m.texel_opacities->grad; }
 };
 
 HostArray host_texels(Mesh& mesh, std::size_t texture) { return &mesh.textures[texture].texels; }
+HostArray host_texel_opacities(Mesh& mesh, std::size_t texture) { return &mesh.textures[texture].opacities; }
 bool has_normals(const Mesh& mesh) { return !mesh.face_normals.empty(); }
 bool has_materials(const Mesh& mesh) { return !mesh.materials.empty(); }
 void forget_levels(Impl& m, std::size_t, bool) { m.geometry->textures.has_levels = false; }
+void forget_levels_of_opacities(Impl& m, std::size_t mesh, bool on_host) {
+  forget_levels(m, mesh, on_host);
+  find_see_through(m, mesh, on_host);
+}
 
 constexpr MeshArray k_positions{.name = "positions",
                                 .components = 3,
@@ -158,9 +165,19 @@ constexpr MeshArray k_opacities{.name = "opacities",
                                 .changed = find_see_through,
                                 .exists = has_opacities,
                                 .what = "opacities"};
+constexpr MeshArray k_texel_opacities{.name = "texel_opacities",
+                                      .components = 1,
+                                      .wanted = &Request::texel_opacities,
+                                      .host = host_texel_opacities,
+                                      .device = DeviceArray::texel_opacities,
+                                      .first = first_texel,
+                                      .gradient = Gradients::texel_opacities,
+                                      .changed = forget_levels_of_opacities,
+                                      .exists = has_texel_opacities,
+                                      .what = "textures with opacities"};
 /// In the order of ArrayId.
-constexpr std::array k_arrays{k_positions, k_colors,    k_texels,   k_texcoords,
-                              k_normals,   k_materials, k_opacities};
+constexpr std::array k_arrays{k_positions, k_colors,    k_texels,    k_texcoords,
+                              k_normals,   k_materials, k_opacities, k_texel_opacities};
 
 [[noreturn]] void refuse_mesh(const ArrayRef& at) {
   throw InvalidArgument("mesh (" + setter_of(at) + ")", std::string("a mesh without ") + row_of(at.id).what,
@@ -191,7 +208,7 @@ HostArray require_array(Scene& scene, const ArrayRef& at) {
   }
   Mesh& mesh = scene.meshes[at.mesh].mesh;
   const MeshArray& row = row_of(at.id);
-  if (at.id == ArrayId::texels && at.texture >= mesh.textures.size())
+  if (is_of_texture(at.id) && at.texture >= mesh.textures.size())
     throw InvalidArgument("texture", std::to_string(at.texture),
                           "below " + std::to_string(mesh.textures.size()));
   if (!row.may_be_empty && !row.exists(mesh)) refuse_mesh(at);
@@ -357,7 +374,7 @@ void set_array(Renderer& renderer, const ArrayRef& at, const BufferSpan& values,
   const MeshArray& row = row_of(at.id);
   const VectorShape shape{count_of(require_array(m.scene, at)), row.components};
   if (shape.count == 0) refuse_mesh(at);
-  if (at.id == ArrayId::opacities) require_sees_through(m.scene.smoothing);
+  if (is_of_opacity(at.id)) require_sees_through(m.scene.smoothing);
   const FloatVectors from = require_vectors(impl_of(m.device), values, shape, Access::read, row.name);
   enqueue(impl_of(m.device), events, [&] { m.take(at, shape.count, from); });
 }

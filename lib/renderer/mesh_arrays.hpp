@@ -50,6 +50,11 @@ struct MeshArray {
 };
 
 const MeshArray& row_of(ArrayId id);
+/// True if an array is of one of a mesh's textures.
+constexpr bool is_of_texture(ArrayId id) { return id == ArrayId::texels || id == ArrayId::texel_opacities; }
+constexpr bool is_of_opacity(ArrayId id) {
+  return id == ArrayId::opacities || id == ArrayId::texel_opacities;
+}
 /// "set_positions"
 std::string setter_of(const ArrayRef& at);
 /// The array whose gradient the member asks for.

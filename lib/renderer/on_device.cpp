@@ -135,7 +135,8 @@ namespace {
 std::optional<BufferView> view_of(const std::optional<DeviceGradient>& gradient, const GradientArray& array) {
   if (!gradient) return std::nullopt;
   const bool is_exponent = std::holds_alternative<std::vector<double>*>(array);
-  const bool is_number = is_exponent || std::holds_alternative<std::vector<float>*>(array);
+  const bool is_number = is_exponent || std::holds_alternative<std::vector<float>*>(array) ||
+                         std::holds_alternative<std::vector<std::vector<float>>*>(array);
   const bool is_pair = std::holds_alternative<std::vector<glm::vec2>*>(array);
   return BufferView{gradient->values.cl_buffer()(),
                     gradient->first * sizeof(cl_float4) + (is_exponent ? k_vector * sizeof(float) : 0),
@@ -183,10 +184,10 @@ BufferView gradient_view(Renderer& renderer, const std::string& name) {
   std::optional<BufferView> found = summed_view(arrays, m, m.grad_numbers, name);
   for_each_array(arrays, [&](const GradientRow& row, GradientIndex index, const GradientArray& array) {
     if (is_summed(row) || found) return;
-    const bool of_texels = row.wanted == &GradientRequest::texture;
-    const std::size_t parts = of_texels ? m.scene.meshes[index.item].mesh.textures.size() : 1;
+    const bool of_textures = is_of_texture(id_of(row.wanted));
+    const std::size_t parts = of_textures ? m.scene.meshes[index.item].mesh.textures.size() : 1;
     for (std::size_t k = 0; k < parts; ++k) {
-      if (name == name_of(row, index) + (of_texels ? checks::element("", k) : ""))
+      if (name == name_of(row, index) + (of_textures ? checks::element("", k) : ""))
         found = view_of(m.mesh_gradient(row, index.item, k), array);
     }
   });

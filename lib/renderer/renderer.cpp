@@ -55,7 +55,7 @@ void Renderer::Impl::require_forward(const char* caller) {
 
 void Renderer::Impl::forward(FrameSizes sizes) {
   require_scene("Renderer::forward");
-  if (is_see_through || wants(ArrayId::opacities)) require_sees_through(scene.smoothing);
+  if (is_see_through || wants_opacities()) require_sees_through(scene.smoothing);
   rendered = false;
   build_pyramids();
   transform.forward(frame, device_views, *geometry, shade.lit());
@@ -78,13 +78,16 @@ void Renderer::Impl::forward(FrameSizes sizes) {
 }
 
 void Renderer::Impl::build_pyramids() {
-  if (geometry->textures.has_levels || geometry->textures.empty()) return;
-  texels->build(geometry->textures);
-  geometry->textures.has_levels = true;
+  Textures& textures = geometry->textures;
+  if (textures.has_levels || textures.empty()) return;
+  texels->build(textures, textures.texel_values);
+  if (textures.has_opacities()) texel_opacities->build(textures, textures.opacities);
+  textures.has_levels = true;
 }
 
 void Renderer::Impl::set_up() {
-  opacity.set_bounds(scene.smoothing.composition, follows_opacities_ || wants(ArrayId::opacities));
+  opacity.set_params(scene.smoothing, follows_opacities_ || wants_opacities(),
+                     geometry->textures.has_opacities());
   frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
   frame.clips = has_device_poses || clip_planes.may_be_crossed(scene, views) ? 1 : 0;
   if (pixel_noise) {
@@ -246,7 +249,7 @@ void Renderer::Impl::render(const Band& band) {
 void Renderer::Impl::shade_and_aggregate() {
   shade.forward(shade_inputs());
   if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
-  if (sees_through()) opacity.forward(frame, *geometry, bin, rasterize);
+  if (sees_through()) opacity.forward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour);
@@ -290,7 +293,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
                           "a lit scene, with view matrices from a buffer",
                           "Renderer::set_views(): the eye's part of it needs their inverses");
   }
-  if (wants(ArrayId::opacities)) {
+  if (wants_opacities()) {
     require_sees_through(scene.smoothing);
     follow_opacities();
   }
@@ -302,8 +305,8 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
                           bands.size() == 1, aggregate.scratch(frame));
   }
-  const bool textured = !geometry->textures.empty();
-  if (wanted.texture && textured) texels->start(geometry->textures);
+  if (wants(ArrayId::texels)) texels->start(geometry->textures);
+  if (wants(ArrayId::texel_opacities)) texel_opacities->start(geometry->textures);
   if (sample_bands.empty()) {
     const BufferRef<cl_float4> grad_raster =
         pixel_noise ? pixel_noise->grad_raster(aggregate.image) : grad_images;
@@ -334,7 +337,8 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     const bool is_lit = shade.lit() || geometry_colors;
     transform.backward(frame, device_views, is_lit, clip.grad, grad_lit, grad_vertices);
   }
-  if (wanted.texture && textured) texels->finish(geometry->textures);
+  if (wants(ArrayId::texels)) texels->finish(geometry->textures);
+  if (wants(ArrayId::texel_opacities)) texel_opacities->finish(geometry->textures);
   gather_mesh_gradients(add_to_positions);
   sum_gradients();
 }
@@ -343,38 +347,42 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
   const GradientRequest& wanted = scene.gradients;
   const bool geometric = is_geometric(wanted);
   aggregate.backward(aggregate_inputs(), scene.background, grad_images, sums_pixels());
-  const bool textured = !geometry->textures.empty();
-  if (geometric || wanted.colors || wanted.materials || (textured && (wanted.texture || wanted.texcoords))) {
+  const bool shows_texels = wants(ArrayId::texels) || wants(ArrayId::texcoords);
+  const bool fades = sees_through() && (geometric || shows_texels || wanted.smoothing || wants_opacities());
+  if (geometric || wanted.colors || wanted.materials || shows_texels ||
+      (fades && geometry->textures.has_opacities()))
     shade.backward(shade_inputs());
-  }
-  if (sees_through() && (geometric || wanted.smoothing || wants(ArrayId::opacities)))
-    opacity.backward(frame, *geometry, bin, rasterize, occupancy.is_sampled());
-  // Distances without noise have no gradient, and rasterization does not read one.
-  if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise) {
-    occupancy.backward(frame, bin, rasterize);
-  }
-  if (textured && wanted.texture) {
+  if (wants(ArrayId::texels)) {
     shade.list_texels(shade_inputs());
     texels->add(geometry->textures, *shade.surface);
   }
+  if (fades) opacity.backward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
+  if (wants(ArrayId::texel_opacities)) {
+    opacity.list_texels(shade.arguments(shade_inputs()), *shade.surface, bin, rasterize);
+    texel_opacities->add(geometry->textures, *shade.surface);
+  }
+  // Distances without noise have no gradient, and rasterization does not read one.
+  if ((geometric || wanted.smoothing) && !aggregate.perturbs_distances() && !pixel_noise)
+    occupancy.backward(frame, bin, rasterize);
   if (geometric) {
     rasterize.backward(frame, setup.triangles, bin);
-    if (textured) shade.backward_detail(shade_inputs(), rasterize.grad_corners, clip.grad_corners);
+    if (!geometry->textures.empty())
+      shade.backward_detail(shade_inputs(), rasterize.grad_corners, clip.grad_corners);
   }
   if (wanted.lights && shade.lit()) {
-    for (std::size_t light = 0; light < shade.light_launches(); ++light) {
+    for (std::size_t light = 0; light < shade.light_launches(); ++light)
       shade.backward_light(shade_inputs(), light);
-    }
   }
 }
 
 std::size_t Renderer::Impl::bytes() const {
   return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
          rasterize.bytes() + shade.bytes() + occupancy.bytes() + opacity.bytes() + aggregate.bytes() +
-         (texels ? texels->bytes() : 0) + gather.bytes() + reduce.bytes() + tangents.bytes() +
-         (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
-         own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() +
-         own_group_.capacity_bytes() + own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
+         (texels ? texels->bytes() : 0) + (texel_opacities ? texel_opacities->bytes() : 0) + gather.bytes() +
+         reduce.bytes() + tangents.bytes() + (aov ? aov->bytes() : 0) +
+         (surface_samples ? surface_samples->bytes() : 0) + own_samples_.capacity_bytes() +
+         own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() + own_group_.capacity_bytes() +
+         own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
          (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
          spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
          spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +

@@ -120,7 +120,9 @@ std::optional<DeviceGradient> Renderer::Impl::mesh_gradient(const GradientRow& r
   if (of_views) return DeviceGradient{values, 0, values.size()};
   Instance& owner = scene.meshes[mesh];
   if (owner.instance_of || !array.exists(owner.mesh)) return std::nullopt;
-  return DeviceGradient{values, array.first(*geometry, at), count_of(array.host(owner.mesh, texture))};
+  const std::size_t count = count_of(array.host(owner.mesh, texture));
+  if (count == 0) return std::nullopt;  // of a texture without opacities
+  return DeviceGradient{values, array.first(*geometry, at), count};
 }
 
 /// Those of materials come with the sums.
@@ -134,10 +136,13 @@ void Renderer::Impl::read_mesh_gradients(SceneGradient& gradient, RowReads& rows
     if (auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array)) read(**vectors);
     if (auto* const* pairs = std::get_if<std::vector<glm::vec2>*>(&array)) read(**pairs);
     if (auto* const* numbers = std::get_if<std::vector<float>*>(&array)) read(**numbers);
-    if (auto* const* textures = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array)) {
-      if (scene.gradients.texture) (*textures)->resize(scene.meshes[index.item].mesh.textures.size());
-      for (std::size_t k = 0; k < (*textures)->size(); ++k) read((**textures)[k], k);
-    }
+    const auto read_textures = [&](auto* textures) {
+      if (scene.gradients.*row.wanted) textures->resize(scene.meshes[index.item].mesh.textures.size());
+      for (std::size_t k = 0; k < textures->size(); ++k) read((*textures)[k], k);
+    };
+    if (auto* const* colors = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array))
+      read_textures(*colors);
+    if (auto* const* numbers = std::get_if<std::vector<std::vector<float>>*>(&array)) read_textures(*numbers);
   });
 }
 

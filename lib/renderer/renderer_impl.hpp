@@ -198,7 +198,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Occupancy occupancy;
   Opacity opacity;
   Aggregate aggregate;
-  std::optional<Texels> texels;  // of textured scenes: made for the first of them
+  std::optional<Texels> texels;           // of textured scenes: made for the first of them
+  std::optional<Texels> texel_opacities;  // made for the first scene whose textures have some
   Gather gather;
   Reduce reduce;
   Tangents tangents;
@@ -266,6 +267,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void render_again(bool is_whole = false);
   void follow_opacities();
   /// True if what lies behind the last frame's surfaces has a part in it.
+  bool wants_opacities() const { return wants(ArrayId::opacities) || wants(ArrayId::texel_opacities); }
   bool sees_through() const { return is_see_through || opacity.is_bounded(); }
   /// Bands of samples of the next frame; none where the budget holds all of them.
   std::vector<Range> cut_samples() const;

@@ -164,6 +164,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
     shade.make_surface();
     if (!texels) texels.emplace(impl_of(device));
   }
+  if (new_geometry.textures.has_opacities() && !texel_opacities) texel_opacities.emplace(impl_of(device));
   Shade::Lighting lighting = shade.prepare(wanted.lights, is_textured(wanted));
   SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1);
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);

@@ -243,7 +243,9 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
       if (bands.size() > 1) render(band);
       rasterize.tangent(frame, setup.triangles, *geometry, bin, tangents);
       occupancy.tangent(frame, rasterize, tangents);
-      if (sees_through()) opacity.tangent(frame, *geometry, bin, rasterize, tangents);
+      if (sees_through())
+        opacity.tangent(shade.arguments(shade_inputs(), tangents), *geometry, bin, rasterize,
+                        tangents.opacities, shade.surface ? &*shade.surface : nullptr);
       shade.tangent(shade_inputs(), tangents);
       aggregate.tangent(aggregate_inputs(), scene.background, tangents, pixel_noise ? 0 : first,
                         pixel_noise ? tangents.rasters : tangents.images);

@@ -19,14 +19,20 @@ using Of = GradientOf;
 using G = SceneGradient;
 using I = GradientIndex;
 
-constexpr std::array k_gradient_names{
-    GradientName{"positions", &Request::positions},   GradientName{"colors", &Request::colors},
-    GradientName{"transform", &Request::transform},   GradientName{"camera", &Request::camera},
-    GradientName{"lights", &Request::lights},         GradientName{"smoothing", &Request::smoothing},
-    GradientName{"background", &Request::background}, GradientName{"texture", &Request::texture},
-    GradientName{"texcoords", &Request::texcoords},   GradientName{"distortion", &Request::distortion},
-    GradientName{"normals", &Request::normals},       GradientName{"materials", &Request::materials},
-    GradientName{"opacities", &Request::opacities}};
+constexpr std::array k_gradient_names{GradientName{"positions", &Request::positions},
+                                      GradientName{"colors", &Request::colors},
+                                      GradientName{"transform", &Request::transform},
+                                      GradientName{"camera", &Request::camera},
+                                      GradientName{"lights", &Request::lights},
+                                      GradientName{"smoothing", &Request::smoothing},
+                                      GradientName{"background", &Request::background},
+                                      GradientName{"texture", &Request::texture},
+                                      GradientName{"texcoords", &Request::texcoords},
+                                      GradientName{"distortion", &Request::distortion},
+                                      GradientName{"normals", &Request::normals},
+                                      GradientName{"materials", &Request::materials},
+                                      GradientName{"opacities", &Request::opacities},
+                                      GradientName{"texel_opacities", &Request::texel_opacities}};
 
 bool has_field_of_view(const Scene& scene) {
   return !scene.camera.intrinsics && !scene.camera.orthographic_height;
@@ -85,6 +91,8 @@ std::vector<GradientRow> make_rows() {
       GradientRow{&Request::materials, Of::mesh, "meshes[].specular", of_mesh<&MeshGradient::specular>},
       GradientRow{&Request::materials, Of::mesh, "meshes[].shininess", of_mesh<&MeshGradient::shininess>},
       GradientRow{&Request::opacities, Of::mesh, "meshes[].opacities", of_mesh<&MeshGradient::opacities>},
+      GradientRow{&Request::texel_opacities, Of::mesh, "meshes[].texel_opacities",
+                  of_mesh<&MeshGradient::texel_opacities>},
       GradientRow{&Request::positions, Of::all_views, "shapes.positions",
                   [](G& g, I) -> GradientArray { return &g.shapes.positions; }},
       GradientRow{&Request::colors, Of::all_views, "shapes.colors",

@@ -41,10 +41,10 @@ struct GradientIndex {
 };
 
 /// A number, a vector, one vector for each vertex, colour, texture coordinate, normal, material or
-/// coefficient, one number for each material or opacity, or a list of texels for each texture.
+/// coefficient, one number for each material or opacity, or a list of texels or of their opacities for each texture.
 using GradientArray =
     std::variant<double*, glm::dvec3*, std::vector<glm::vec3>*, std::vector<glm::vec2>*, std::vector<double>*,
-                 std::vector<float>*, std::vector<std::vector<glm::vec3>>*>;
+                 std::vector<float>*, std::vector<std::vector<glm::vec3>>*, std::vector<std::vector<float>>*>;
 
 struct GradientRow {
   bool GradientRequest::*wanted;

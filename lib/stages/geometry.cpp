@@ -159,7 +159,7 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
   add_colors(device, scene, all_faces);
   if (is_textured(scene)) add_textures(device, scene, all_faces);
   if (gives_normals(scene)) add_normals(device, scene, all_faces);
-  if (std::ranges::any_of(scene.meshes, has_opacities, &Instance::mesh))
+  if (std::ranges::any_of(scene.meshes, has_opacities, &Instance::mesh) || textures.has_opacities())
     add_opacities(device, scene, all_faces);
   face_vertices.upload(device, all_faces);
   add_materials(device, scene);
@@ -215,7 +215,8 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<
 
 /// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.
 void Geometry::add_textures(Device::Impl& device, const Scene& scene, std::vector<cl_uint4>& all_faces) {
-  std::vector<cl_float4> all_texcoords, all_texels;
+  std::vector<cl_float4> all_texcoords, all_texels, all_opacities;
+  const bool has_opacities = std::ranges::any_of(scene.meshes, has_texel_opacities, &Instance::mesh);
   texcoord_faces = all_faces.size();
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
@@ -235,6 +236,9 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene, std::vecto
       textures.list.push_back(device_texture(texture, all_texels.size()));
       for (const glm::vec3& texel : texture.texels) all_texels.push_back(to_cl(texel));
       all_texels.resize(all_texels.size() + texels_of_smaller_levels(textures.list.back()));
+      if (!has_opacities) continue;
+      for (const float opacity : texture.opacities) all_opacities.push_back(to_cl(glm::vec3(opacity, 0, 0)));
+      all_opacities.resize(all_texels.size(), to_cl(glm::vec3(1, 0, 0)));
     }
   }
   constexpr std::size_t k_most = 1U << 30U;  // of which four sums each can be counted
@@ -246,6 +250,7 @@ void Geometry::add_textures(Device::Impl& device, const Scene& scene, std::vecto
   textures.texcoord_values.upload(device, all_texcoords);
   textures.textures.upload(device, textures.list);
   textures.texel_values.upload(device, all_texels);
+  textures.opacities.upload(device, all_opacities);
   textures.texcoord_corners =
       make_incidence(device, std::span(all_faces).subspan(texcoord_faces), textures.texcoords);
 }
@@ -329,7 +334,8 @@ std::size_t Opacities::bytes() const {
 
 std::size_t Textures::bytes() const {
   return texcoord_values.capacity_bytes() + textures.capacity_bytes() + texel_values.capacity_bytes() +
-         texcoord_corners.starts.capacity_bytes() + texcoord_corners.corners.capacity_bytes();
+         opacities.capacity_bytes() + texcoord_corners.starts.capacity_bytes() +
+         texcoord_corners.corners.capacity_bytes();
 }
 
 std::size_t Geometry::bytes() const {

@@ -38,10 +38,13 @@ struct Textures {
   Buffer<cl_float4> texcoord_values;  ///< [texcoord] u, v
   Buffer<shared::Texture> textures;   ///< `list`
   Buffer<cl_float4> texel_values;     ///< [texel] of every level
-  bool has_levels = false;            ///< the smaller levels are those of the largest
+  /// The same in the first component, 1 of textures without. Empty where no texture has any.
+  Buffer<cl_float4> opacities;
+  bool has_levels = false;  ///< the smaller levels are those of the largest
   Incidence texcoord_corners;
 
   bool empty() const { return list.empty(); }
+  bool has_opacities() const { return opacities.size() > 0; }
   /// True if some have smaller levels.
   bool has_pyramids() const {
     return std::ranges::any_of(list, [](const shared::Texture& t) { return t.levels > 1; });
@@ -71,8 +74,8 @@ struct SurfaceMaterials {
   std::size_t bytes() const;
 };
 
-/// The opacities of all meshes, one of each mesh without, and where corners look into them. Empty where no mesh has
-/// any.
+/// The opacities of all meshes' vertices or faces, one of each mesh without, and where corners look into them. Empty
+/// where no mesh has any.
 struct Opacities {
   Buffer<cl_float4> values;  ///< [opacity] in the first component
   Incidence corners;

@@ -1,62 +1,103 @@
 #include "stages/opacity.hpp"
 
 namespace dpr {
+namespace {
 
-Opacity::Kernels& Opacity::kernels() { return launch_ ? *launch_ : launch_.emplace(device_); }
-
-void Opacity::set_bounds(Composition composition, bool follows_opacities) {
-  bounds_ = {{composition == Composition::joint ? 1e-6F : 1e-20F, follows_opacities ? 1 - 1e-6F : 1}};
+template <class Arguments>
+OpacityArguments<Arguments> with_texels(const Arguments& in, const shared::OpacityParams& in_force,
+                                        const Geometry& geometry) {
+  return {in, in_force, geometry.textures.opacities};
 }
 
-void Opacity::forward(const shared::FrameParams& p, const Geometry& geometry, const Bin& bin,
-                      Rasterize& rasterize) {
+}  // namespace
+
+void Opacity::set_params(const Smoothing& smoothing, bool follows_opacities, bool is_textured) {
+  in_force_ = {smoothing.composition == Composition::joint ? 1e-6F : 1e-20F,
+               follows_opacities ? 1 - 1e-6F : 1,
+               cl_uint{smoothing.occupancy_estimator == Estimator::monte_carlo}, cl_uint{is_textured}};
+}
+
+void Opacity::forward(const SurfaceArguments& in, const Geometry& geometry, const Bin& bin,
+                      const Rasterize& rasterize) {
   const PairGroups groups = rasterize.pair_groups(bin);
-  kernels()(groups.count, kernel::opacity_forward{.p = p,
-                                                  .bounds = bounds_,
+  kernels()(groups.count, kernel::opacity_forward{.p = in.p,
+                                                  .in_force = in_force_,
                                                   .range = groups.pairs,
-                                                  .pairs = bin.pair_count,
-                                                  .pair_face = bin.pair_face,
-                                                  .fragment_starts = rasterize.fragment_starts,
-                                                  .faces = geometry.face_vertices,
+                                                  .pairs = in.pairs,
+                                                  .pair_face = in.pair_face,
+                                                  .fragment_starts = in.fragment_starts,
+                                                  .faces = in.faces,
                                                   .opacities = geometry.opacities.values,
-                                                  .fragments = rasterize.values});
+                                                  .fragments = in.fragments});
+  if (in_force_.is_textured)
+    texture_kernels()(rasterize.pairs(bin),
+                      kernel::opacity_texels_forward::pick(with_texels(in, in_force_, geometry)));
 }
 
-void Opacity::backward(const shared::FrameParams& p, const Geometry& geometry, const Bin& bin,
-                       Rasterize& rasterize, bool is_sampled) {
+void Opacity::backward(const SurfaceArguments& in, const Geometry& geometry, const Bin& bin,
+                       const Rasterize& rasterize) {
+  if (in_force_.is_textured)
+    texture_kernels()(rasterize.pairs(bin),
+                      kernel::opacity_texels_backward::pick(with_texels(in, in_force_, geometry)));
   grad_pairs.resize(device_, Length::varying(std::size_t{9} * bin.pairs));
   const PairGroups groups = rasterize.pair_groups(bin);
-  kernels()(groups.count, kernel::opacity_backward{.p = p,
-                                                   .bounds = bounds_,
+  kernels()(groups.count, kernel::opacity_backward{.p = in.p,
+                                                   .in_force = in_force_,
                                                    .range = groups.pairs,
-                                                   .is_sampled = cl_uint{is_sampled},
-                                                   .pairs = bin.pair_count,
-                                                   .pair_face = bin.pair_face,
-                                                   .fragment_starts = rasterize.fragment_starts,
-                                                   .faces = geometry.face_vertices,
+                                                   .pairs = in.pairs,
+                                                   .pair_face = in.pair_face,
+                                                   .fragment_starts = in.fragment_starts,
+                                                   .faces = in.faces,
                                                    .opacities = geometry.opacities.values,
-                                                   .fragments = rasterize.values,
-                                                   .grads = rasterize.grads,
+                                                   .fragments = in.fragments,
+                                                   .grads = in.grads,
                                                    .grad_opacities = grad_pairs});
 }
 
-void Opacity::tangent(const shared::FrameParams& p, const Geometry& geometry, const Bin& bin,
-                      const Rasterize& rasterize, Tangents& tangents) {
+void Opacity::list_texels(const SurfaceArguments& in, Surface& surface, const Bin& bin,
+                          const Rasterize& rasterize) {
+  surface.start_list(in.p, rasterize);
+  texture_kernels()(rasterize.pairs(bin), kernel::opacity_texels_list{.p = in.p,
+                                                                      .pairs = in.pairs,
+                                                                      .pair_face = in.pair_face,
+                                                                      .fragment_starts = in.fragment_starts,
+                                                                      .faces = in.faces,
+                                                                      .texcoords = in.texcoords,
+                                                                      .textures = in.textures,
+                                                                      .triangles = in.triangles,
+                                                                      .clipped = in.clipped,
+                                                                      .fragments = in.fragments,
+                                                                      .grads = in.grads,
+                                                                      .cells = surface.cells,
+                                                                      .seen = surface.seen});
+  surface.finish_list(in, bin, rasterize);
+}
+
+void Opacity::tangent(const SurfaceTangentArguments& in, const Geometry& geometry, const Bin& bin,
+                      const Rasterize& rasterize, const Buffer<cl_float4>& opacity_tangents,
+                      Surface* surface) {
   const PairGroups groups = rasterize.pair_groups(bin);
   kernels()(groups.count,
-            kernel::opacity_tangent{.p = p,
-                                    .bounds = bounds_,
+            kernel::opacity_tangent{.p = in.p,
+                                    .in_force = in_force_,
                                     .range = groups.pairs,
-                                    .q = tangents.params,
-                                    .moving = to_uint(tangents.opacities.size() / tangents.params.directions),
-                                    .pairs = bin.pair_count,
-                                    .pair_face = bin.pair_face,
-                                    .fragment_starts = rasterize.fragment_starts,
-                                    .faces = geometry.face_vertices,
+                                    .q = in.q,
+                                    .moving = to_uint(opacity_tangents.size() / in.q.directions),
+                                    .pairs = in.pairs,
+                                    .pair_face = in.pair_face,
+                                    .fragment_starts = in.fragment_starts,
+                                    .faces = in.faces,
                                     .opacities = geometry.opacities.values,
-                                    .opacity_tangents = tangents.opacities,
-                                    .fragments = rasterize.values,
-                                    .tangents = tangents.fragments});
+                                    .opacity_tangents = opacity_tangents,
+                                    .fragments = in.fragments,
+                                    .tangents = in.tangents});
+  if (!in_force_.is_textured) return;
+  const Range pairs = rasterize.pairs(bin);
+  texture_kernels()(pairs, kernel::opacity_texels_tangent::pick(with_texels(in, in_force_, geometry)));
+  SurfaceTangentArguments to_log = in;
+  to_log.q.base_plane =
+      DPR_PLANE_LOG_OCCUPANCY - 2;  // of the third of three planes; shading fills the others
+  surface->tangent_detail(to_log, pairs);
 }
 
 }  // namespace dpr

@@ -63,6 +63,11 @@ SurfaceArguments Shade::arguments(const ShadeInputs& in) {
           .channels = light_channels};
 }
 
+SurfaceTangentArguments Shade::arguments(const ShadeInputs& in, Tangents& tangents) {
+  return {arguments(in), tangents.params, tangents.colors,   tangents.world,
+          tangents.ndc,  tangents.clip,   tangents.fragments};
+}
+
 void Shade::forward(const ShadeInputs& in) {
   const bool is_textured = !in.geometry.textures.empty();
   const Range pairs = in.rasterize.pairs(in.bin);
@@ -196,8 +201,7 @@ void Shade::tangent_of_normals(const ShadeInputs& in, Tangents& tangents) {
 void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
   const bool is_textured = !in.geometry.textures.empty();
   const Range pairs = in.rasterize.pairs(in.bin);
-  const SurfaceTangentArguments all{arguments(in), tangents.params, tangents.colors,   tangents.world,
-                                    tangents.ndc,  tangents.clip,   tangents.fragments};
+  const SurfaceTangentArguments all = arguments(in, tangents);
   if (is_textured) {
     surface->tangent(all, pairs);
   } else if (!lit() || tangents.params.colors != 0) {

@@ -66,6 +66,9 @@ class Shade {
 
   /// Before the first textured scene.
   void make_surface();
+  /// Of what a scene has not the kernels get null pointers, which they do not read.
+  SurfaceArguments arguments(const ShadeInputs& in);
+  SurfaceTangentArguments arguments(const ShadeInputs& in, Tangents& tangents);
   /// Everything about setting the lights that can fail.
   Lighting prepare(const std::optional<Lights>& lights, bool is_textured) const;
   void set(Lighting&& prepared) noexcept { std::swap(now_, prepared); }
@@ -121,8 +124,6 @@ class Shade {
   Launcher<kernel::shade_forward, kernel::shade_backward, kernel::shade_tangent> launch_;
   bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
   void find_normals(const ShadeInputs& in);
-  /// Of what a scene has not the kernels get null pointers, which they do not read.
-  SurfaceArguments arguments(const ShadeInputs& in);
 
   Lighting now_;
   Buffer<cl_float4> grad_normals_;  // [view][normal]

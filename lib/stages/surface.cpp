@@ -19,10 +19,7 @@ void Surface::backward_detail(const SurfaceArguments& in, const Range& pairs, Bu
 
 void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bin,
                    const Rasterize& rasterize) {
-  const std::size_t places = in.p.levels * rasterize.fragments;
-  place_count.resize(device_, 1);
-  cells.resize(device_, places);
-  seen.resize(device_, places);
+  start_list(in.p, rasterize);
   launch_(pairs, kernel::surface_list{.p = in.p,
                                       .pairs = in.pairs,
                                       .pair_face = in.pair_face,
@@ -37,12 +34,24 @@ void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bi
                                       .grads = in.grads,
                                       .cells = cells,
                                       .seen = seen});
-  launch_(std::max<std::size_t>(places, 1), kernel::surface_place{.p = in.p,
-                                                                  .fragment_starts = in.fragment_starts,
-                                                                  .fragment_pair = rasterize.fragment_pair,
-                                                                  .pair_tile = bin.pair_tile,
-                                                                  .places = place_count,
-                                                                  .seen = seen});
+  finish_list(in, bin, rasterize);
+}
+
+void Surface::start_list(const shared::FrameParams& p, const Rasterize& rasterize) {
+  const std::size_t places = p.levels * rasterize.fragments;
+  place_count.resize(device_, 1);
+  cells.resize(device_, places);
+  seen.resize(device_, places);
+}
+
+void Surface::finish_list(const SurfaceArguments& in, const Bin& bin, const Rasterize& rasterize) {
+  launch_(std::max<std::size_t>(seen.size(), 1),
+          kernel::surface_place{.p = in.p,
+                                .fragment_starts = in.fragment_starts,
+                                .fragment_pair = rasterize.fragment_pair,
+                                .pair_tile = bin.pair_tile,
+                                .places = place_count,
+                                .seen = seen});
 }
 
 }  // namespace dpr

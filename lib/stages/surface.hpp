@@ -49,10 +49,18 @@ class Surface {
                        Buffer<float>& grad_clip);
   /// Lists the texels that the band's fragments see, by fragment and level, for the stage that gathers.
   void list(const SurfaceArguments& in, const Range& pairs, const Bin& bin, const Rasterize& rasterize);
+  /// Around another stage's kernel that lists: makes room, and says where the texels lie.
+  void start_list(const shared::FrameParams& p, const Rasterize& rasterize);
+  void finish_list(const SurfaceArguments& in, const Bin& bin, const Rasterize& rasterize);
 
   /// From the tangents of barycentrics, corners and their colours to those of the base colours.
   void tangent(const SurfaceTangentArguments& in, const Range& pairs) {
     launch_(pairs, kernel::surface_tangent::pick(in));
+    tangent_detail(in, pairs);
+  }
+  /// Adds what goes by way of the levels of detail to three planes from in.q.base_plane on. The derivatives by them lie
+  /// behind the last direction's tangents.
+  void tangent_detail(const SurfaceTangentArguments& in, const Range& pairs) {
     if (in.p.levels > 1) launch_(pairs, kernel::surface_detail_tangent::pick(in));
   }
 

@@ -28,14 +28,13 @@ Texels::Texels(Device::Impl& device) : device_(device), sort_(device), launch_(d
   if (device.info.lanes == 1) share_.emplace(device);
 }
 
-void Texels::build(Textures& textures) {
+void Texels::build(const Textures& textures, Buffer<cl_float4>& values) {
   for (cl_uint i = 0; i < textures.list.size(); ++i) {
     const shared::Texture& t = textures.list[i];
     for (cl_uint level = 1; level < t.levels; ++level)
-      launch_(
-          texels_of_level(t, level),
-          kernel::texels_shrink{
-              .number = i, .level = level, .textures = textures.textures, .texels = textures.texel_values});
+      launch_(texels_of_level(t, level),
+              kernel::texels_shrink{
+                  .number = i, .level = level, .textures = textures.textures, .texels = values});
   }
 }
 

@@ -14,8 +14,8 @@ class Texels {
  public:
   explicit Texels(Device::Impl& device);
 
-  /// Fills the smaller levels from the largest.
-  void build(Textures& textures);
+  /// Fills the smaller levels from the largest, of texels or of their opacities.
+  void build(const Textures& textures, Buffer<cl_float4>& values);
   /// Before the first band of a frame.
   void start(const Textures& textures);
   /// Adds a band's fragments, as Surface::list() left them; their order is lost there.

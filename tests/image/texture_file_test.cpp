@@ -39,9 +39,12 @@ TEST_SUITE("unit") {
     CHECK(texture.texels[1].g == doctest::Approx(8 / 255.0 / 12.92));
     CHECK(texture.texels[2].r == doctest::Approx(std::pow((128 / 255.0 + 0.055) / 1.055, 2.4)));
     CHECK(texture.texels[3].b == doctest::Approx(1));
+    REQUIRE(texture.opacities.size() == 4);
+    CHECK(texture.opacities[2] == doctest::Approx(0.5).epsilon(0.01));
     write_texture(folder / "again.png", texture);
     const Image again = read_image(folder / "again.png", nullptr, Encoding::linear);
     for (int i = 0; i < 4; ++i) CHECK(again.at(i, 0).r == bytes.at(i, 0).r);
+    CHECK(again.at(1, 0).a == texture.opacities[1]);
   }
 
   TEST_CASE("texture: files of floats are taken as they are, rows from the top") {
@@ -51,6 +54,7 @@ TEST_SUITE("unit") {
     texture.height = 3;
     write_texture(folder / "a.exr", texture);
     CHECK(read_texture(folder / "a.exr").texels == texture.texels);
+    CHECK(read_texture(folder / "a.exr").opacities.empty());
     CHECK(read_image(folder / "a.exr").at(0, 1).g == 0.25F);
   }
 

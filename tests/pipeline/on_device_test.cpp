@@ -45,6 +45,12 @@ std::vector<std::pair<std::string, std::vector<float>>> arrays_of(const std::str
                           packed(std::span<const glm::vec3>(texels)));
     return arrays;
   }
+  if (const auto* const* textures = std::get_if<std::vector<std::vector<float>>*>(&array)) {
+    std::vector<std::pair<std::string, std::vector<float>>> arrays;
+    for (const std::vector<float>& opacities : **textures)
+      arrays.emplace_back(name + "[" + std::to_string(arrays.size()) + "]", opacities);
+    return arrays;
+  }
   std::vector<float> values;
   transform_numbers(array, [&](double value) { return values.push_back(static_cast<float>(value)), value; });
   return {{name, values}};
@@ -84,6 +90,7 @@ Scene spoiled(Scene scene) {
     for (glm::vec3& n : instance.mesh.normals) n.x += 0.4F;
     for (Material& m : instance.mesh.materials) m = {};
     for (float& o : instance.mesh.face_opacities) o = 1;
+    for (Texture& t : instance.mesh.textures) t.opacities.assign(t.opacities.size(), 1.0F);
     instance.transform[3].x += 0.1F;
   }
   if (!scene.lights) scene.camera.view[3].z -= 0.3F;
@@ -106,6 +113,9 @@ void set_from_buffers(const Caller& caller, Renderer& renderer, const Scene& sce
     for (std::size_t t = 0; t < mesh.textures.size(); ++t) {
       const std::vector<glm::vec3>& texels = mesh.textures[t].texels;
       set_texels(renderer, m, t, {caller.buffer(laid_out(std::span(texels), 0, 4))(), 0, 4 * sizeof(float)});
+      const std::vector<float>& of_texels = mesh.textures[t].opacities;
+      if (!of_texels.empty())
+        set_texel_opacities(renderer, m, t, {caller.buffer(laid_out_numbers(of_texels))(), 8, 8});
     }
     if (!mesh.textures.empty())
       set_texcoords(renderer, m, {caller.buffer(packed(std::span(mesh.texcoords)))()});
@@ -147,8 +157,12 @@ std::vector<Scene> scenes() {
   normals.gradients.materials = true;
   two.meshes[1].mesh.face_opacities = {0.3F, 0.5F, 0.7F, 0.9F, 1.0F};
   two.gradients.opacities = true;
-  std::vector<Scene> all{test_scene(), sampled_scene(), sampled_joint_scene(), joint_scene(), texture,
-                         two,          normals};
+  Scene leaf = texture;
+  leaf.meshes[0].mesh.textures[0].opacities.assign(15, 0.6F);
+  leaf.meshes[0].mesh.textures[0].opacities[4] = 0.2F;
+  leaf.gradients.texel_opacities = true;
+  std::vector<Scene> all{
+      test_scene(), sampled_scene(), sampled_joint_scene(), joint_scene(), texture, two, normals, leaf};
   for (Scene& scene : all) scene.gradients.camera = scene.gradients.transform = true;
   return all;
 }
