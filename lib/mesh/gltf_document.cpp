@@ -230,7 +230,7 @@ std::vector<glm::vec4> GltfDocument::vectors(const JsonNode& number) {
   if (from.components < 2) number.fail("an accessor of single numbers", "one of vectors");
   const Component& component = *component_of(from.type);
   const bool is_scaled = from.is_normalized && from.type != k_float;
-  std::vector<glm::vec4> vectors(from.count, glm::vec4(0));
+  std::vector<glm::vec4> vectors(from.count, glm::vec4(0, 0, 0, 1));
   for (std::size_t i = 0; i < from.count; ++i) {
     for (std::size_t c = 0; c < from.components; ++c) {
       float& value = vectors[i][static_cast<int>(c)];

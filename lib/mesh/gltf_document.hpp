@@ -26,7 +26,7 @@ class GltfDocument {
   /// The element of a list at the root that a number in the JSON names.
   const JsonNode& named(const std::string& list, const JsonNode& number);
 
-  /// [element] the vectors of an accessor: two to four numbers of any type, then zeros.
+  /// [element] the vectors of an accessor: two to four numbers of any type, of 0, 0, 0, 1.
   std::vector<glm::vec4> vectors(const JsonNode& accessor);
   /// [element] the whole numbers of an accessor.
   std::vector<std::uint32_t> indices(const JsonNode& accessor);

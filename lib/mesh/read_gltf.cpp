@@ -9,32 +9,16 @@
 
 #include "base/checks.hpp"
 #include "dpr/error.hpp"
-#include "image/codec.hpp"
-#include "mesh/gltf_document.hpp"
+#include "mesh/gltf_materials.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/weld.hpp"
 
 namespace dpr {
 namespace {
 
-constexpr std::uint64_t k_largest_index = std::numeric_limits<std::uint32_t>::max();
-
 /// Extensions without which a file may not be read, and which are.
 constexpr std::array<std::string_view, 4> k_extensions{"KHR_materials_unlit", "KHR_mesh_quantization",
                                                        "KHR_texture_transform", "KHR_materials_specular"};
-
-glm::vec4 numbers(const JsonNode& list, std::size_t count) {
-  glm::vec4 numbers(0);
-  int i = 0;
-  for (const JsonNode& number : list.elements(count)) numbers[i++] = number.number();
-  return numbers;
-}
-
-glm::vec4 numbers_or(const JsonNode& node, std::string_view key, std::size_t count,
-                     const glm::vec4& otherwise) {
-  const std::optional<JsonNode> list = node.find(key);
-  return list ? numbers(*list, count) : otherwise;
-}
 
 /// Where a node lies in its parent.
 glm::mat4 transform_of(const JsonNode& node) {
@@ -44,35 +28,14 @@ glm::mat4 transform_of(const JsonNode& node) {
     for (int i = 0; i < 16; ++i) transform[i / 4][i % 4] = entries[static_cast<std::size_t>(i)].number();
     return transform;
   }
-  const glm::vec4 translation = numbers_or(node, "translation", 3, glm::vec4(0));
-  const glm::vec4 rotation = numbers_or(node, "rotation", 4, {0, 0, 0, 1});
-  const glm::vec4 scale = numbers_or(node, "scale", 3, glm::vec4(1));
+  const glm::vec4 translation = gltf_numbers_or(node, "translation", 3, glm::vec4(0));
+  const glm::vec4 rotation = gltf_numbers_or(node, "rotation", 4, {0, 0, 0, 1});
+  const glm::vec4 scale = gltf_numbers_or(node, "scale", 3, glm::vec4(1));
   transform = glm::mat4(glm::mat3_cast(glm::quat(rotation.w, rotation.x, rotation.y, rotation.z)));
   for (int axis = 0; axis < 3; ++axis) transform[axis] *= scale[axis];
   transform[3] = glm::vec4(glm::vec3(translation), 1);
   return transform;
 }
-
-/// Coordinates of a texture that is moved within its coordinates (KHR_texture_transform).
-struct TextureTransform {
-  glm::vec2 offset{0}, scale{1};
-  float rotation = 0;  ///< radians
-
-  /// Coordinates with v down.
-  glm::vec2 operator()(const glm::vec2& uv) const {
-    const glm::vec2 scaled = uv * scale;
-    const float c = std::cos(rotation), s = std::sin(rotation);
-    return offset + glm::vec2(c * scaled.x + s * scaled.y, c * scaled.y - s * scaled.x);
-  }
-};
-
-/// What a material says of its colour.
-struct BaseColor {
-  glm::vec3 factor{1};
-  std::uint32_t texture = k_no_texture;  ///< in the mesh
-  std::string texcoords = "TEXCOORD_0";  ///< the attribute
-  TextureTransform transform;
-};
 
 class GltfReader {
  public:
@@ -190,11 +153,15 @@ class GltfReader {
       return vectors;
     };
     const std::optional<JsonNode> material = primitive.find("material");
-    const BaseColor color = material ? base_color(*material) : BaseColor();
+    const BaseColor color = material ? materials_.base_color(*material) : BaseColor();
     const std::vector<glm::vec4> texcoords = attribute(color.texcoords);
     if (color.texture != k_no_texture && texcoords.empty())
       note(primitive, "a texture without " + color.texcoords + ": its faces have their other colours alone");
-    append(corners, positions, attribute("NORMAL"), texcoords, attribute("COLOR_0"), color, transform);
+    const std::vector<glm::vec4> colors = attribute("COLOR_0");
+    const bool has_alpha =
+        std::ranges::any_of(colors, [](const glm::vec4& of_vertex) { return of_vertex.a < 1; });
+    if (has_alpha && color.threshold && *color.threshold > 0) note(primitive, "COLOR_0: alpha is not masked");
+    append(corners, positions, attribute("NORMAL"), texcoords, colors, color, transform);
   }
 
   /// Appends triangles with the vertices that they use.
@@ -212,6 +179,8 @@ class GltfReader {
       numbers[v] = static_cast<std::uint32_t>(mesh_.positions.size());
       mesh_.positions.emplace_back(transform * glm::vec4(glm::vec3(positions[v]), 1));
       mesh_.vertex_colors.push_back(colors.empty() ? glm::vec3(1) : glm::vec3(colors[v]));
+      mesh_.vertex_opacities.push_back(
+          colors.empty() || color.threshold ? 1.0F : glm::clamp(colors[v].a, 0.0F, 1.0F));
       mesh_.normals.push_back(normals.empty()
                                   ? glm::vec3(0)
                                   : (is_mirrored ? -1.0F : 1.0F) * (cofactors * glm::vec3(normals[v])));
@@ -226,28 +195,37 @@ class GltfReader {
       mesh_.faces.push_back(face);
       mesh_.face_colors.push_back(color.factor);
       mesh_.face_textures.push_back(texcoords.empty() ? k_no_texture : color.texture);
+      mesh_.face_opacities.push_back(color.opacity(mesh_.face_textures.back() != k_no_texture));
     }
     lacks_normals_ = lacks_normals_ || normals.empty();
     lacks_texcoords_ = lacks_texcoords_ || texcoords.empty();
     has_colors_ = has_colors_ || !colors.empty();
   }
 
-  /// Leaves out what says nothing, and makes the form that Mesh asks for.
-  void finish() {
-    const auto is_white = [](const glm::vec3& color) { return color == glm::vec3(1); };
-    const bool has_factors = !std::ranges::all_of(mesh_.face_colors, is_white);
-    if (has_colors_ && has_factors) {  // every primitive has vertices of its own
-      std::vector<bool> is_done(mesh_.positions.size());
-      for (std::size_t f = 0; f < mesh_.faces.size(); ++f) {
+  /// Of the values of vertices, all 1 unless `of_vertices`, and of faces: leaves one list, or none where all are 1.
+  template <class Value>
+  void join(std::vector<Value>& vertices, std::vector<Value>& faces, bool of_vertices) const {
+    const bool of_faces = std::ranges::any_of(faces, [](const Value& value) { return value != Value(1); });
+    if (of_vertices && of_faces) {  // every primitive has vertices of its own
+      std::vector<bool> is_done(vertices.size());
+      for (std::size_t f = 0; f < faces.size(); ++f) {
         for (int c = 0; c < 3; ++c) {
           const std::uint32_t v = mesh_.faces[f][c];
-          if (!is_done[v]) mesh_.vertex_colors[v] *= mesh_.face_colors[f];
+          if (!is_done[v]) vertices[v] *= faces[f];
           is_done[v] = true;
         }
       }
     }
-    if (has_colors_ || !has_factors) mesh_.face_colors.clear();
-    if (!has_colors_) mesh_.vertex_colors.clear();
+    if (of_vertices || !of_faces) faces.clear();
+    if (!of_vertices) vertices.clear();
+  }
+
+  /// Leaves out what says nothing, and makes the form that Mesh asks for.
+  void finish() {
+    join(mesh_.vertex_colors, mesh_.face_colors, has_colors_);
+    const bool has_opacities =
+        std::ranges::any_of(mesh_.vertex_opacities, [](float opacity) { return opacity < 1; });
+    join(mesh_.vertex_opacities, mesh_.face_opacities, has_opacities);
     const auto is_untextured = [](std::uint32_t texture) { return texture == k_no_texture; };
     if (std::ranges::all_of(mesh_.face_textures, is_untextured)) {
       mesh_.textures.clear();
@@ -259,98 +237,7 @@ class GltfReader {
     if (lacks_normals_) mesh_.normals.clear();
     if (!mesh_.texcoords.empty()) mesh_.face_texcoords = mesh_.faces;
     if (!mesh_.normals.empty()) mesh_.face_normals = mesh_.faces;
-    if (!has_colors_) weld(mesh_);
-  }
-
-  const BaseColor& base_color(const JsonNode& number) {
-    const JsonNode& material = document_.named("materials", number);
-    const auto [place, is_new] = colors_.try_emplace(number.whole_number(k_largest_index));
-    BaseColor& color = place->second;
-    if (!is_new) return color;
-    std::string unread;
-    const auto look_for = [&](const JsonNode& node, std::initializer_list<std::string_view> keys) {
-      for (const std::string_view key : keys) {
-        if (node.find(key)) unread += (unread.empty() ? "" : ", ") + std::string(key);
-      }
-    };
-    look_for(material, {"alphaMode", "emissiveTexture", "normalTexture", "occlusionTexture"});
-    if (const std::optional<JsonNode> surface = material.find("pbrMetallicRoughness")) {
-      look_for(*surface, {"metallicRoughnessTexture"});
-      color.factor = glm::vec3(numbers_or(*surface, "baseColorFactor", 4, glm::vec4(1)));
-      if (const std::optional<JsonNode> texture = surface->find("baseColorTexture"))
-        read_texture_of(*texture, color);
-    }
-    if (!unread.empty()) note(material, "not read: " + unread);
-    return color;
-  }
-
-  void read_texture_of(const JsonNode& reference, BaseColor& color) {
-    std::uint64_t set = 0;
-    if (const std::optional<JsonNode> texcoord = reference.find("texCoord"))
-      set = texcoord->whole_number(k_largest_index);
-    if (const std::optional<JsonNode> extensions = reference.find("extensions")) {
-      if (const std::optional<JsonNode> moved = extensions->find("KHR_texture_transform")) {
-        color.transform.offset = glm::vec2(numbers_or(*moved, "offset", 2, glm::vec4(0)));
-        color.transform.scale = glm::vec2(numbers_or(*moved, "scale", 2, glm::vec4(1)));
-        if (const std::optional<JsonNode> rotation = moved->find("rotation"))
-          color.transform.rotation = rotation->number();
-        if (const std::optional<JsonNode> texcoord = moved->find("texCoord"))
-          set = texcoord->whole_number(k_largest_index);
-      }
-    }
-    color.texcoords = "TEXCOORD_" + std::to_string(set);
-    const JsonNode index = reference.at("index");
-    const JsonNode& texture = document_.named("textures", index);
-    const auto [place, is_new] = textures_.try_emplace(index.whole_number(k_largest_index), k_no_texture);
-    if (is_new) {
-      std::optional<Texture> read = image_of(texture);
-      if (read) {
-        if (const std::optional<JsonNode> sampler = texture.find("sampler"))
-          apply_sampler(document_.named("samplers", *sampler), *read);
-        place->second = static_cast<std::uint32_t>(mesh_.textures.size());
-        mesh_.textures.push_back(std::move(*read));
-      }
-    }
-    color.texture = place->second;
-  }
-
-  std::optional<Texture> image_of(const JsonNode& texture) {
-    const std::optional<JsonNode> source = texture.find("source");
-    if (!source) {
-      note(texture, "no image that is read: its faces have their other colours alone");
-      return {};
-    }
-    const JsonNode& image = document_.named("images", *source);
-    if (const std::optional<JsonNode> view = image.find("bufferView"))
-      return decode_texture(image.name(), document_.view(*view));
-    const JsonNode uri = image.at("uri");
-    std::string data;
-    if (GltfDocument::decode(uri, data)) return decode_texture(image.name(), data);
-    const std::filesystem::path path = document_.beside(uri);
-    std::error_code error;
-    if (std::filesystem::is_regular_file(path, error)) return read_texture(path);
-    note(uri, "the texture \"" + uri.string() + "\"" + what_is_wrong(path) +
-                  ": its faces have their other colours alone");
-    return {};
-  }
-
-  void apply_sampler(const JsonNode& sampler, Texture& texture) {
-    const auto value = [&](std::string_view key, std::uint64_t otherwise) {
-      const std::optional<JsonNode> found = sampler.find(key);
-      return found ? found->whole_number(k_largest_index) : otherwise;
-    };
-    constexpr std::uint64_t k_repeat = 10497, k_clamp = 33071, k_mirror = 33648, k_nearest = 9728;
-    constexpr std::uint64_t k_first_of_mips = 9984, k_last_of_mips = 9987;
-    const std::uint64_t wrap = value("wrapS", k_repeat);
-    if (wrap == k_clamp) texture.wrap = Wrap::clamp;
-    if (wrap == k_mirror) texture.wrap = Wrap::mirror;
-    if (value("wrapT", k_repeat) != wrap) note(sampler, "\"wrapT\" is not read: both ways as \"wrapS\"");
-    const std::uint64_t smaller = value("minFilter", 0);
-    if (smaller >= k_first_of_mips && smaller <= k_last_of_mips) {
-      texture.filter = Filter::trilinear;
-    } else if (value("magFilter", 0) == k_nearest) {
-      texture.filter = Filter::nearest;
-    }
+    if (!has_colors_ && !has_opacities) weld(mesh_);
   }
 
   static constexpr std::uint64_t k_triangles = 4, k_strip = 5, k_fan = 6;
@@ -358,9 +245,8 @@ class GltfReader {
   GltfDocument document_;
   Notes& notes_;
   Mesh mesh_;
-  std::set<std::uint64_t> visited_;                  // nodes
-  std::map<std::uint64_t, BaseColor> colors_;        // by material
-  std::map<std::uint64_t, std::uint32_t> textures_;  // of the mesh, by texture
+  GltfMaterials materials_{document_, notes_, mesh_.textures};
+  std::set<std::uint64_t> visited_;  // nodes
   bool lacks_normals_ = false, lacks_texcoords_ = false, has_colors_ = false;
 };
 

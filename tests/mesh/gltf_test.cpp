@@ -198,6 +198,67 @@ TEST_SUITE("unit") {
     CHECK(glm::distance(moved.texcoords[1], glm::vec2(1.5F, 2.75F)) < 1e-6F);
   }
 
+  TEST_CASE("glTF: alpha is opacity where it blends or is masked, and nothing else") {
+    const TempDir folder;
+    Texture texture{4, 1, {{1, 0, 0}, {0, 0, 1}, {1, 1, 1}, {0, 1, 0}}};
+    texture.opacities = {0, 0.4F, 0.6F, 1};
+    write_texture(folder / "leaf.png", texture);
+    Document document = square();
+    texture_reference(document, {{"uri", "leaf.png"}});
+    Json& material = document.json["materials"][0];
+    material["pbrMetallicRoughness"]["baseColorFactor"] = {1, 1, 1, 0.5};
+    using List = std::vector<float>;
+    const auto check = [&](const List& of_texels, const List& of_faces, const List& of_vertices = {}) {
+      const Mesh mesh = read_mesh(document.write(folder));
+      if (!mesh.textures.empty()) {
+        CHECK(mesh.textures[0].texels == texture.texels);
+        REQUIRE(mesh.textures[0].opacities.size() == of_texels.size());
+        for (std::size_t i = 0; i < of_texels.size(); ++i)
+          CHECK(mesh.textures[0].opacities[i] == doctest::Approx(of_texels[i]).epsilon(0.01));
+      }
+      CHECK(mesh.face_opacities == of_faces);
+      CHECK(mesh.vertex_opacities == of_vertices);
+    };
+    check({}, {});
+    material["alphaMode"] = "OPAQUE";
+    check({}, {});
+    material["alphaMode"] = "BLEND";
+    check(texture.opacities, {0.5F, 0.5F});
+    material["alphaMode"] = "MASK";  // 0.5 unless it is given: of the product
+    check({0, 0, 0, 1}, {});
+    material["alphaCutoff"] = 0.25;
+    check({0, 0, 1, 1}, {});
+    material["alphaCutoff"] = 0;
+    check({}, {});
+    material["alphaCutoff"] = 0.6;
+    check({0, 0, 0, 0}, {});
+
+    // A texture of two materials is two, where one alone blends.
+    document.json["materials"].push_back(Json(material));
+    document.json["materials"][0]["alphaMode"] = "BLEND";
+    document.json["meshes"][0]["primitives"].push_back(document.primitive());
+    document.json["meshes"][0]["primitives"][1]["material"] = 1;
+    const Mesh both = read_mesh(document.write(folder));
+    REQUIRE(both.textures.size() == 2);
+    CHECK(both.textures[0].opacities.size() == 4);
+    CHECK(both.textures[1].opacities == List(4, 0));
+    CHECK(both.face_opacities == List{0.5F, 0.5F, 1, 1});
+    document.json["meshes"][0]["primitives"].erase(1);
+
+    document.json["materials"][0]["pbrMetallicRoughness"].erase("baseColorTexture");
+    check({}, {0.5F, 0.5F});
+    document.primitive()["attributes"]["COLOR_0"] = document.add<std::uint8_t>(
+        {255, 0, 0, 255, 0, 255, 0, 51, 51, 102, 255, 255, 0, 0, 0, 0}, 5121, "VEC4", 4, true);
+    check({}, {}, {0.5F, 0.1F, 0.5F, 0});
+    document.json["materials"][0]["alphaMode"] = "MASK";
+    check({}, {0, 0});
+    Notes notes;
+    read_mesh(document.write(folder), notes);
+    CHECK(notes.size() == 1);
+    document.json["materials"][0]["alphaMode"] = "GLASS";
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(document.write(folder)), "OPAQUE, MASK or BLEND");
+  }
+
   TEST_CASE("glTF: what is left out is noted") {
     const TempDir folder;
     Document document = square();
