@@ -116,18 +116,15 @@ typedef struct dpr_camera {
 typedef enum dpr_wrap { DPR_WRAP_REPEAT = 0, DPR_WRAP_MIRROR = 1, DPR_WRAP_CLAMP = 2 } dpr_wrap;
 
 /* Between the centres of texels: the nearest, the four around, or those of two levels of a pyramid. */
-typedef enum dpr_filter {
-  DPR_FILTER_NEAREST = 0,
-  DPR_FILTER_BILINEAR = 1,
-  DPR_FILTER_TRILINEAR = 2
-} dpr_filter;
+typedef enum dpr_filter { DPR_FILTER_NEAREST, DPR_FILTER_BILINEAR, DPR_FILTER_TRILINEAR } dpr_filter;
 
 /* Texture coordinates (u, v) have v up: (0, 0) is the lower left corner of the image. */
 typedef struct dpr_texture {
-  int width, height;   /* 1 to 16384 */
-  const float* texels; /* [height][width][3], row 0 on top */
-  int wrap;            /* a dpr_wrap */
-  int filter;          /* a dpr_filter */
+  int width, height;      /* 1 to 16384 */
+  const float* texels;    /* [height][width][3], row 0 on top */
+  int wrap;               /* a dpr_wrap */
+  int filter;             /* a dpr_filter */
+  const float* opacities; /* [height][width], from 0 to 1; NULL: opaque */
 } dpr_texture;
 
 /* The texture of a face that has none. */
@@ -235,7 +232,7 @@ DPR_API dpr_status dpr_scene_set_smoothing_word(dpr_scene* scene, const char* ke
 DPR_API dpr_status dpr_scene_set_smoothing_number(dpr_scene* scene, const char* key, double number);
 /* Gradients that backward passes compute: "positions", "colors", "transform", "camera", "lights",
  * "smoothing", "background", "texture" (the texels), "texcoords", "distortion" (of lenses), "normals",
- * "materials", "opacities". Without this call all but "lights" and the last six. */
+ * "materials", "opacities", "texel_opacities". Without this call all but "lights" and the last seven. */
 DPR_API dpr_status dpr_scene_set_gradients(dpr_scene* scene, const char* const* names, size_t count);
 DPR_API void dpr_scene_destroy(dpr_scene* scene);
 
@@ -269,6 +266,9 @@ DPR_API dpr_status dpr_renderer_set_materials(dpr_renderer* renderer, size_t mes
 /* New opacities of a mesh that has some, [vertex] or [face], `count` floats: as many as it has. */
 DPR_API dpr_status dpr_renderer_set_opacities(dpr_renderer* renderer, size_t mesh, const float* opacities,
                                               size_t count);
+/* New opacities of a texture that has some, [height][width], `count` floats. */
+DPR_API dpr_status dpr_renderer_set_texel_opacities(dpr_renderer* renderer, size_t mesh, size_t texture,
+                                                    const float* opacities, size_t count);
 /* Gives every view a shape of its own: [view][vertex][3] and [view][color][3], each of all meshes one after
  * the other without instances, so many floats. NULL and 0: the scene's. */
 DPR_API dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions,
@@ -375,9 +375,9 @@ DPR_API dpr_status dpr_backward_pixels(dpr_renderer* renderer, const float* grad
 DPR_API dpr_status dpr_backward_buffer(dpr_renderer* renderer, struct _cl_mem* grad, dpr_gradient** gradient);
 
 /* The arrays that the scene asked for, by names such as "meshes[0].positions", "views[0].camera.rotation" or
- * "sigma". Those of a mesh's textures are one, "meshes[0].textures": one texture after the other. A mesh's
- * arrays are summed over its instances; of an instance itself, mesh 1 say, there are no "meshes[1]. ...", but
- * "views[0].meshes[1].rotation" and "views[0].meshes[1].translation". */
+ * "sigma". Those of a mesh's textures are one, "meshes[0].textures" or "meshes[0].texel_opacities": one texture after
+ * the other. A mesh's arrays are summed over its instances; of an instance itself, mesh 1 say, there are no
+ * "meshes[1]. ...", but "views[0].meshes[1].rotation" and "views[0].meshes[1].translation". */
 DPR_API dpr_status dpr_gradient_count(const dpr_gradient* gradient, size_t* count);
 /* Valid as long as the handle. */
 DPR_API dpr_status dpr_gradient_name(const dpr_gradient* gradient, size_t index, const char** name);

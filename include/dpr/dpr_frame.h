@@ -17,6 +17,7 @@
  *                     or [T, 2]               with face_texcoords
  *   face_texcoords       [F, 3]               whole numbers
  *   textures[0], ...     [H, W, 3]            linear RGB, row 0 on top; they need texcoords
+ *                     or [H, W, 4]            the fourth channel is opacity, from 0 to 1
  *   face_textures        [F]                  whole numbers, -1 for none; all have the first without
  *   materials.specular   [M, 3]               1 without
  *   materials.shininess  [M]                  those of the lights without

@@ -66,6 +66,9 @@ DPR_API dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, size_
 /* From 0 to 1, which is not checked; noise on the pixel refuses them whatever they are. */
 DPR_API dpr_status dpr_renderer_set_opacities_from(dpr_renderer* renderer, size_t mesh,
                                                    const dpr_buffer* opacities, const dpr_events* events);
+DPR_API dpr_status dpr_renderer_set_texel_opacities_from(dpr_renderer* renderer, size_t mesh, size_t texture,
+                                                         const dpr_buffer* opacities,
+                                                         const dpr_events* events);
 /* As dpr_renderer_set_shapes(); one that is NULL is the scene's. */
 DPR_API dpr_status dpr_renderer_set_shapes_from(dpr_renderer* renderer, const dpr_buffer* positions,
                                                 const dpr_buffer* colors, const dpr_events* events);

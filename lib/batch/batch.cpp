@@ -55,6 +55,10 @@ void make_opaque(Renderer& renderer) {
   const Mesh& mesh = renderer.scene().meshes[0].mesh;
   const std::vector<float> ones(mesh.vertex_opacities.size() + mesh.face_opacities.size(), 1.0F);
   if (!ones.empty()) renderer.set_opacities(0, ones);
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
+    const std::vector<float> of_texture(mesh.textures[i].opacities.size(), 1.0F);
+    if (!of_texture.empty()) renderer.set_texel_opacities(0, i, of_texture);
+  }
 }
 
 /// The vectors of an array, [n][3] or [view][n][3], once for every view.
@@ -71,7 +75,7 @@ GradientRequest request_of_attribute(std::span<const std::string> names, Attribu
   GradientRequest request = request_of(names, false);
   request.texcoords = request.texcoords && attribute == Attribute::texcoords;
   request.colors = request.background = request.lights = request.texture = request.materials = false;
-  request.opacities = false;
+  request.opacities = request.texel_opacities = false;
   return request;
 }
 

@@ -99,13 +99,27 @@ void for_each_array_of(const std::string& name, SceneGradient& gradient, const V
     for (i.item = 0; i.item < count.item; ++i.item) {
       for (const GradientRow* const row : rows) {
         const GradientArray array = row->array(gradient, i);
-        const auto* const textures = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array);
-        if (!textures) visit(*row, i, array);
-        for (std::size_t k = 0; textures && k < (*textures)->size(); ++k)
-          if (name == texture_name(k)) visit(*row, i, &(**textures)[k]);
+        const auto visit_texture = [&](auto* textures) {
+          for (std::size_t k = 0; k < textures->size(); ++k)
+            if (name == texture_name(k)) visit(*row, i, &(*textures)[k]);
+        };
+        if (const auto* const texels = std::get_if<std::vector<std::vector<glm::vec3>>*>(&array)) {
+          visit_texture(*texels);
+        } else if (const auto* const opacities = std::get_if<std::vector<std::vector<float>>*>(&array)) {
+          visit_texture(*opacities);
+        } else {
+          visit(*row, i, array);
+        }
       }
     }
   }
+}
+
+/// Adds a texture's texels, or their opacities, to channels of [H, W, 4] from `first` on.
+void add_channels(std::span<const float> numbers, std::size_t channels, std::size_t first,
+                  std::span<float> sums) {
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    sums[4 * (i / channels) + first + i % channels] += numbers[i];
 }
 
 std::string argument_of_tangent(const NamedArray& tangent) { return "tangent of " + argument(tangent); }
@@ -156,7 +170,15 @@ void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray&
   for_each_array_of(gradient.name, found, [&](const GradientRow& row, GradientIndex i, GradientArray array) {
     if (!exists(row, i, renderer.scene(), views)) return;
     const auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array);
-    if (vectors && next == 0 && sums.size() == 3 * (*vectors)->size()) {  // millions, perhaps
+    const auto* const* opacities = std::get_if<std::vector<float>*>(&array);
+    const bool is_texture = gradient.name.starts_with("textures[");
+    if (is_texture && vectors && sums.size() == 4 * (*vectors)->size()) {
+      add_channels(checks::floats_of(std::span<const glm::vec3>(**vectors)), 3, 0, sums);
+      count += 3 * (*vectors)->size();
+    } else if (is_texture && opacities && sums.size() == 4 * (*opacities)->size()) {
+      add_channels(**opacities, 1, 3, sums);
+      count += (*opacities)->size();
+    } else if (vectors && next == 0 && sums.size() == 3 * (*vectors)->size()) {  // millions, perhaps
       const std::span<const float> floats = checks::floats_of(std::span<const glm::vec3>(**vectors));
       std::ranges::transform(sums, floats, sums.begin(), std::plus());
       count += floats.size();

@@ -88,13 +88,14 @@ std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings&
   std::vector<TextureForm> forms;
   for (std::size_t i = 0; i < count; ++i) {
     const NamedArray& texture = require(arrays, texture_name(i));
-    require_form(texture, Element::float32, {{k_any, k_any, 3}, {1, k_any, k_any, 3}},
-                 "[H, W, 3], or [N, H, W, 3] of each view by itself");
+    require_form(texture, Element::float32,
+                 {{k_any, k_any, 3}, {1, k_any, k_any, 3}, {k_any, k_any, 4}, {1, k_any, k_any, 4}},
+                 "[H, W, 3] or [H, W, 4], or with N in front of each view by itself");
     const std::size_t rows = texture.shape.size() - 3;
     forms.push_back({texture_side(texture.shape[rows + 1], texture),
                      texture_side(texture.shape[rows], texture),
                      mode_of(settings.wraps(), i, count, "wrap", usual.wrap),
-                     mode_of(settings.filters(), i, count, "filter", usual.filter)});
+                     mode_of(settings.filters(), i, count, "filter", usual.filter), has_alpha(texture)});
   }
   return forms;
 }
@@ -189,10 +190,25 @@ std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
     const std::string_view path = row.path, list = path.substr(0, path.find("[]"));
     const auto has = [&](const Path& known) { return known.first == name && path.starts_with(known.second); };
     if (std::ranges::any_of(k_paths, has) || (is_light && list == name) ||
-        (name.starts_with(k_texture) && path == "meshes[].textures"))
+        (name.starts_with(k_texture) && (path == "meshes[].textures" || path == "meshes[].texel_opacities")))
       rows.push_back(&row);
   }
   return rows;
+}
+
+bool has_alpha(const NamedArray& texture) { return texture.shape.back() == 4; }
+
+void take_texture(const NamedArray& from, std::vector<glm::vec3>& texels, std::vector<float>& opacities) {
+  texels.clear();
+  opacities.clear();
+  if (!has_alpha(from)) {
+    const auto rows = from.rows<const glm::vec3>();
+    return texels.assign(rows.begin(), rows.end());
+  }
+  for (const glm::vec4& texel : from.rows<const glm::vec4>()) {
+    texels.emplace_back(texel);
+    opacities.push_back(texel.a);
+  }
 }
 
 const NamedArray* find_colors(NamedArrays arrays) {
@@ -343,8 +359,18 @@ void upload_surface(Renderer& renderer, NamedArrays arrays) {
   const Mesh& mesh = renderer.scene().meshes[0].mesh;
   if (!mesh.texcoords.empty())
     renderer.set_texcoords(0, require(arrays, "texcoords").rows<const glm::vec2>());
-  for (std::size_t i = 0; i < mesh.textures.size(); ++i)
-    renderer.set_texels(0, i, require(arrays, texture_name(i)).rows<const glm::vec3>());
+  std::vector<glm::vec3> texels;
+  std::vector<float> texel_opacities;
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
+    const NamedArray& texture = require(arrays, texture_name(i));
+    if (!has_alpha(texture)) {  // millions, perhaps: not copied
+      renderer.set_texels(0, i, texture.rows<const glm::vec3>());
+      continue;
+    }
+    take_texture(texture, texels, texel_opacities);
+    renderer.set_texels(0, i, texels);
+    renderer.set_texel_opacities(0, i, texel_opacities);
+  }
   if (const NamedArray* const opacities = find_opacities(arrays))
     renderer.set_opacities(0, opacities->rows<const float>());
   if (mesh.materials.empty()) return;

@@ -34,6 +34,9 @@ const NamedArray* find_colors(NamedArrays arrays);
 const NamedArray* find_opacities(NamedArrays arrays);
 /// "textures[2]"
 std::string texture_name(std::size_t index);
+/// True if the fourth channel is there, which is opacity.
+bool has_alpha(const NamedArray& texture);
+void take_texture(const NamedArray& from, std::vector<glm::vec3>& texels, std::vector<float>& opacities);
 /// Rows of the gradients' table whose numbers are an array's gradient, but for those of views' matrices: of lights
 /// and views one after the other. None for other names.
 std::vector<const GradientRow*> gradient_rows_of(std::string_view name);

@@ -26,6 +26,8 @@ class MeshFile {
     add("faces", mesh_.faces, 3);
     add("colors", mesh_.vertex_colors, 3);
     add("face_colors", mesh_.face_colors, 3);
+    add("opacities", mesh_.vertex_opacities, 1);
+    add("face_opacities", mesh_.face_opacities, 1);
     add("texcoords", mesh_.texcoords, 2);
     add("face_texcoords", mesh_.face_texcoords, 3);
     add("face_textures", mesh_.face_textures, 1);
@@ -77,8 +79,16 @@ class MeshFile {
     std::string wraps = "wrap=", filters = "filter=";
     for (std::size_t i = 0; i < mesh_.textures.size(); ++i) {
       Texture& texture = mesh_.textures[i];
-      add(texture_name(i), texture.texels.data(), Element::float32,
-          {static_cast<std::size_t>(texture.height), static_cast<std::size_t>(texture.width), 3});
+      const auto height = static_cast<std::size_t>(texture.height),
+                 width = static_cast<std::size_t>(texture.width);
+      if (texture.opacities.empty()) {
+        add(texture_name(i), texture.texels.data(), Element::float32, {height, width, 3});
+      } else {
+        std::vector<glm::vec4>& texels = with_opacities_.emplace_back();
+        for (std::size_t k = 0; k < texture.texels.size(); ++k)
+          texels.emplace_back(texture.texels[k], texture.opacities[k]);
+        add(texture_name(i), texels.data(), Element::float32, {height, width, 4});
+      }
       const char* const comma = i == 0 ? "" : ",";
       wraps.append(comma).append(to_string(texture.wrap));
       filters.append(comma).append(to_string(texture.filter));
@@ -103,6 +113,7 @@ class MeshFile {
 
   Notes notes_;
   Mesh mesh_;
+  std::list<std::vector<glm::vec4>> with_opacities_;  // texels of such textures
   std::vector<glm::vec3> specular_;
   std::vector<float> shininess_;
   std::list<std::string> names_;
@@ -141,7 +152,7 @@ Mesh make_mesh(NamedArrays arrays, const RenderSettings& settings) {
   take_colors("face_colors", mesh.faces.size(), mesh.face_colors);
   if (!mesh.texcoords.empty()) take(require(arrays, "texcoords"), mesh.texcoords);
   for (std::size_t i = 0; i < mesh.textures.size(); ++i)
-    take(require(arrays, texture_name(i)), mesh.textures[i].texels);
+    take_texture(require(arrays, texture_name(i)), mesh.textures[i].texels, mesh.textures[i].opacities);
   return mesh;
 }
 

@@ -30,7 +30,7 @@ void require_own_process() {
 bool has_surface(const Mesh& mesh, const Surface& surface) {
   const auto has_form = [](const Texture& texture, const TextureForm& form) {
     return texture.width == form.width && texture.height == form.height && texture.wrap == form.wrap &&
-           texture.filter == form.filter;
+           texture.filter == form.filter && texture.opacities.empty() != form.has_opacities;
   };
   return mesh.texcoords.size() == surface.texcoords && mesh.materials.size() == surface.materials &&
          mesh.vertex_opacities.size() == surface.vertex_opacities &&
@@ -47,8 +47,8 @@ void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.face_texcoords = surface.face_texcoords;
   for (const TextureForm& form : surface.textures) {
     const std::size_t texels = static_cast<std::size_t>(form.width) * static_cast<std::size_t>(form.height);
-    mesh.textures.push_back(
-        {form.width, form.height, std::vector<glm::vec3>(texels), form.wrap, form.filter});
+    mesh.textures.push_back({form.width, form.height, std::vector<glm::vec3>(texels), form.wrap, form.filter,
+                             std::vector<float>(form.has_opacities ? texels : 0, 1.0F)});
   }
   mesh.face_textures = surface.face_textures;
   mesh.materials.resize(surface.materials);

@@ -25,6 +25,7 @@ struct TextureForm {
   int width = 0, height = 0;
   Wrap wrap = Wrap::repeat;
   Filter filter = Filter::bilinear;
+  bool has_opacities = false;
 
   bool operator==(const TextureForm&) const = default;
 };

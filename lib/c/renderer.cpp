@@ -121,6 +121,11 @@ dpr_status dpr_renderer_set_opacities(dpr_renderer* renderer, std::size_t mesh, 
   return set_floats(renderer, {dpr::ArrayId::opacities, mesh}, opacities, count);
 }
 
+dpr_status dpr_renderer_set_texel_opacities(dpr_renderer* renderer, std::size_t mesh, std::size_t texture,
+                                            const float* opacities, std::size_t count) {
+  return set_floats(renderer, {dpr::ArrayId::texel_opacities, mesh, texture}, opacities, count);
+}
+
 dpr_status dpr_renderer_set_positions_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* positions, const dpr_events* events) {
   return set_from(renderer, {dpr::ArrayId::positions, mesh}, positions, events);
@@ -154,6 +159,12 @@ dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, std::size_t m
 dpr_status dpr_renderer_set_opacities_from(dpr_renderer* renderer, std::size_t mesh,
                                            const dpr_buffer* opacities, const dpr_events* events) {
   return set_from(renderer, {dpr::ArrayId::opacities, mesh}, opacities, events);
+}
+
+dpr_status dpr_renderer_set_texel_opacities_from(dpr_renderer* renderer, std::size_t mesh,
+                                                 std::size_t texture, const dpr_buffer* opacities,
+                                                 const dpr_events* events) {
+  return set_from(renderer, {dpr::ArrayId::texel_opacities, mesh, texture}, opacities, events);
 }
 
 dpr_status dpr_renderer_set_shapes(dpr_renderer* renderer, const float* positions, std::size_t position_count,

@@ -111,6 +111,7 @@ Texture to_texture(const dpr_texture& given, const std::string& argument) {
   if (can_be_side(given.width) && can_be_side(given.height)) {  // validate() tells of others
     const auto rows = static_cast<std::size_t>(given.height), columns = static_cast<std::size_t>(given.width);
     texture.texels = triples(given.texels, rows * columns);
+    if (given.opacities) texture.opacities.assign(given.opacities, given.opacities + rows * columns);
   }
   return texture;
 }

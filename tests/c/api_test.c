@@ -153,7 +153,7 @@ static const float texcoords[] = {0, 0, 1, 0, 0.5f, 1};
 static const float texels[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; /* red, green; blue, white */
 
 static dpr_texture four_texels(void) {
-  dpr_texture texture = {2, 2, NULL, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR};
+  dpr_texture texture = {2, 2, NULL, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR, NULL};
   texture.texels = texels;
   return texture;
 }
@@ -1057,11 +1057,14 @@ static void test_setters(const dpr_device* device) {
   const uint32_t first[] = {0, 0, 0}, beyond[] = {0, 1, 0}, of_face[] = {0};
   const dpr_material dull[] = {{{0.1f, 0.2f, 0.3f}, 3}}, bright[] = {{{1, 0.9f, 0.8f}, 0}};
   const float clear[] = {0.5f, 0.25f, 0.75f}, opaque[] = {1, 1, 1};
-  const char* const wanted[] = {"normals", "materials", "opacities"};
+  const float texels[] = {1, 0.5f, 0.5f, 0.5f, 1, 0.5f}, texcoords[] = {0.3f, 0.5f, 0.9f, 0.5f};
+  const uint32_t corners[] = {0, 1, 0};
+  const char* const wanted[] = {"normals", "materials", "opacities", "texel_opacities"};
   const char* const others[] = {"positions"};
   const dpr_camera camera = three_units_away();
   dpr_point_light light = {{1, 2, 4}, {0.6f, 0.6f, 0.6f}, {0.5f, 0.5f, 0.5f}};
   dpr_lights lights = DPR_LIGHTS_INIT;
+  dpr_texture leaf = {2, 1, texels, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR, NULL};
   dpr_mesh mesh = triangle();
   float image[FLOATS];
   size_t count = 0;
@@ -1076,10 +1079,13 @@ static void test_setters(const dpr_device* device) {
     mesh.materials = is_new ? bright : dull, mesh.material_count = 1;
     mesh.face_materials = of_face;
     mesh.vertex_opacities = is_new ? clear : opaque;
+    leaf.opacities = mesh.vertex_opacities;
+    mesh.texcoords = texcoords, mesh.texcoord_count = 2, mesh.face_texcoords = corners;
+    mesh.textures = &leaf, mesh.texture_count = 1;
     OK(dpr_scene_create(SIDE, SIDE, &scene));
     OK(dpr_scene_add_mesh(scene, &mesh));
     OK(dpr_scene_set_camera(scene, &camera));
-    OK(dpr_scene_set_gradients(scene, wanted, is_new ? 3 : 2)); /* noise on the pixel has none of opacities */
+    OK(dpr_scene_set_gradients(scene, wanted, is_new ? 4 : 2)); /* noise on the pixel has none of opacities */
     OK(dpr_renderer_create(device, &renderers[is_new]));
     renderer = renderers[is_new];
     if (is_new) OK(dpr_scene_set_background(scene, grey));
@@ -1103,6 +1109,9 @@ static void test_setters(const dpr_device* device) {
       EXPECT(differs(renderer, image));
       OK(dpr_renderer_set_opacities(renderer, 0, clear, 3));
       OK(dpr_renderer_forward(renderer));
+      EXPECT(differs(renderer, image));
+      OK(dpr_renderer_set_texel_opacities(renderer, 0, 0, clear, 2));
+      OK(dpr_renderer_forward(renderer));
       EXPECT(!differs(renderer, image));
       OK(dpr_renderer_set_lights(renderer, NULL));
       OK(dpr_renderer_forward(renderer));
@@ -1116,6 +1125,7 @@ static void test_setters(const dpr_device* device) {
     REFUSED(dpr_renderer_set_materials(renderer, 0, NULL, 1), "materials");
     REFUSED(dpr_renderer_set_materials(renderer, 0, bright, 0), "expected 1");
     REFUSED(dpr_renderer_set_opacities(renderer, 0, clear, 2), "expected 3");
+    REFUSED(dpr_renderer_set_texel_opacities(renderer, 0, 0, clear, 3), "expected 2");
     REFUSED(dpr_renderer_set_smoothing(renderer, NULL), "scene");
     REFUSED(dpr_renderer_set_cull(renderer, "some"), "word");
     REFUSED(dpr_renderer_set_background(renderer, NULL), "color");
@@ -1127,6 +1137,8 @@ static void test_setters(const dpr_device* device) {
   EXPECT(count == 3);
   OK(dpr_gradient_size(gradient, "meshes[0].opacities", &count));
   EXPECT(count == 3);
+  OK(dpr_gradient_size(gradient, "meshes[0].texel_opacities", &count));
+  EXPECT(count == 2);
   OK(dpr_gradient_size(gradient, "meshes[0].specular", &count));
   dpr_gradient_destroy(gradient);
   OK(dpr_renderer_set_gradients(renderer, others, 1));

@@ -108,6 +108,30 @@ class NumpyTest(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, "opacities.*expected a number from 0 to 1"):
                 renderer(**{**arguments, name: np.full(count, 1.5, np.float32)})
 
+    def test_opacities_of_texels(self):
+        views, intrinsics = cameras(2)
+        arguments = {"views": views, "intrinsics": intrinsics, "vertices": SQUARE, "faces": SQUARE_FACES,
+                     "texcoords": random(len(SQUARE), 2, seed=6)}
+        leaf = random(5, 7, 4, seed=4) * np.float32(0.8) + np.float32(0.1)
+        direction = random(5, 7, 4, seed=7) - 0.5
+        self.check_gradient("textures", lambda given, step: (
+            {**given, "textures": given["textures"] + np.float32(step) * direction}, lambda g: (g * direction).sum()),
+            "textures", {**arguments, "textures": leaf})
+        renderer = dpr.Renderer(SIZE, SIZE, **SMOOTH)
+        opaque = np.concatenate([leaf[..., :3], np.ones((5, 7, 1), np.float32)], 2)
+        plain = renderer(**arguments, textures=leaf[..., :3].copy())
+        np.testing.assert_array_equal(renderer(**arguments, textures=opaque), plain)
+        self.assertGreater(np.abs(renderer(**arguments, textures=leaf) - plain).max(), 0.1)
+        mixed = [leaf[..., :3].copy(), leaf]
+        faces = {"face_textures": np.arange(len(SQUARE_FACES)) % 2}
+        gradient = renderer.vjp(**arguments, **faces, textures=mixed, wrt=["textures"])[1](plain)["textures"]
+        self.assertEqual([texture.shape for texture in gradient], [(5, 7, 3), (5, 7, 4)])
+        self.assertGreater(np.abs(gradient[1][..., 3]).max(), 0)
+        with self.assertRaisesRegex(ValueError, "joint_gaussian"):
+            dpr.render(**arguments, textures=leaf, width=SIZE, height=SIZE, preset="pixel")
+        with self.assertRaisesRegex(ValueError, "opacities.*expected a number from 0 to 1"):
+            renderer(**arguments, textures=2 * leaf)
+
     def test_gradients_through_a_fisheye(self):
         views, intrinsics = cameras(2)
         rows = np.concatenate([intrinsics, np.tile(np.float32([0.3, -0.2, 0.1, -0.05]), (2, 1))], 1)

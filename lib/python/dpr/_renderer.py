@@ -118,7 +118,7 @@ class Renderer:
         texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
         face_texcoords  [F, 3], int64 or int32: their indices
         textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by
-                     itself. Colours multiply them
+                     itself. Colours multiply them. Of [H, W, 4] the fourth channel is opacity, which opacities multiply
         face_textures   [F], int64 or int32: the faces' textures, -1 for none; all have the first unless given
         wrap         "repeat", "mirror" or "clamp", what lies beyond [0, 1]; a word, or a list of one a texture
         filter       "nearest", "bilinear" or "trilinear", which has a pyramid of smaller images; likewise
