@@ -58,6 +58,33 @@ TEST_SUITE("pipeline") {
     CHECK(contains(run_command(folder, {"info", "n.obj"}).out, "  normals              1\n"));
   }
 
+  TEST_CASE("dpr info, render and pose: a glTF mesh that blends") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    const std::string text =
+        R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+      "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+      "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+      "bufferViews": [{"buffer": 0, "byteLength": 36}], "buffers": [{"byteLength": 36, "uri":
+      "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+      "materials": [{"alphaMode": ")";
+    const std::string factor = R"(", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.5]}}]})";
+    folder.write("opaque.gltf", text + "OPAQUE" + factor);
+    folder.write("blend.gltf", text + "BLEND" + factor);
+    CHECK(!notes(info(folder, "opaque.gltf"), "opacities below 1"));
+    CHECK(notes(info(folder, "blend.gltf"), "opacities below 1"));
+    CHECK(run_command(folder, {"render", "opaque.gltf", "-o", "a.png"}).status == 0);
+    const auto refused = run_command(folder, {"render", "blend.gltf", "-o", "b.png"});
+    CHECK(refused.status != 0);
+    CHECK(contains(refused.err, "joint_gaussian"));
+    CHECK(run_command(folder, {"render", "blend.gltf", "--preset", "joint_gaussian", "-o", "b.png"}).status ==
+          0);
+    CHECK(run_command(folder, {"pose", "opaque.gltf", "a.png", "--iterations", "1"}).status == 0);
+    const auto pose = run_command(folder, {"pose", "blend.gltf", "a.png"});
+    CHECK(pose.status != 0);
+    CHECK(contains(pose.err, "an opaque mesh"));
+  }
+
   TEST_CASE("dpr info: holes, faces without area, missing material libraries, textures") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -94,8 +121,8 @@ TEST_SUITE("pipeline") {
     CHECK(scene["gradients"] == json({"camera"}));
     REQUIRE(scene["meshes"].size() == 2);
     CHECK(scene["meshes"][0]["file"] == "cube.ply");
-    CHECK(notes(scene["meshes"][0], "2 triangles nearer than znear"));  // the front
-    CHECK(notes(scene["meshes"][0], "8 triangles clipped at znear or zfar"));   // all but the back
+    CHECK(notes(scene["meshes"][0], "2 triangles nearer than znear"));         // the front
+    CHECK(notes(scene["meshes"][0], "8 triangles clipped at znear or zfar"));  // all but the back
     CHECK(scene["meshes"][1]["file"].is_null());
     CHECK(notes(scene["meshes"][1], "no colours: white"));
     const auto text = run_command(folder, {"info", "scene.json"});

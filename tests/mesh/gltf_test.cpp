@@ -256,7 +256,7 @@ TEST_SUITE("unit") {
     read_mesh(document.write(folder), notes);
     CHECK(notes.size() == 1);
     document.json["materials"][0]["alphaMode"] = "GLASS";
-    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(document.write(folder)), "OPAQUE, MASK or BLEND");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, read_mesh(document.write(folder)), "OPAQUE, MASK or BLEND");
   }
 
   TEST_CASE("glTF: what is left out is noted") {
