@@ -79,10 +79,16 @@ TEST_SUITE("pipeline") {
     CHECK(contains(refused.err, "joint_gaussian"));
     CHECK(run_command(folder, {"render", "blend.gltf", "--preset", "joint_gaussian", "-o", "b.png"}).status ==
           0);
-    CHECK(run_command(folder, {"pose", "opaque.gltf", "a.png", "--iterations", "1"}).status == 0);
-    const auto pose = run_command(folder, {"pose", "blend.gltf", "a.png"});
-    CHECK(pose.status != 0);
-    CHECK(contains(pose.err, "an opaque mesh"));
+    const auto pose = [&](const std::string& file) {
+      folder.write("scene.json", R"({"width": 24, "height": 24, "smoothing": {"preset": "joint_gaussian"},
+        "camera": {"view": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -4], [0, 0, 0, 1]], "znear": 1, "zfar": 9},
+        "meshes": [{"file": ")" + file +
+                                     R"("}]})");
+      return run_command(
+          folder, {"pose", "--scene", "scene.json", "--target", "a.png", "--rotations", "0", "-o", "p.json"});
+    };
+    CHECK(pose("opaque.gltf").status == 0);
+    CHECK(contains(pose("blend.gltf").err, "an opaque mesh"));
   }
 
   TEST_CASE("dpr info: holes, faces without area, missing material libraries, textures") {
