@@ -262,7 +262,7 @@ TEST_SUITE("robustness") {
     const std::vector<glm::vec2> pairs(positions.size());
     const std::span<const glm::vec2> of_two = pairs;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_array({ArrayId::positions}, of_two), "another type");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_array({static_cast<ArrayId>(7)}, of_two), "ArrayId");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_array({static_cast<ArrayId>(8)}, of_two), "ArrayId");
 
     const Image grad(scene.width, scene.height, glm::vec4(1));
     const std::vector<Image> two(2, grad);

@@ -26,11 +26,11 @@ def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
         image = dpr.render(**mesh, views=views, intrinsics=intrinsics, width=256, height=256)
 
     vertices [V, 3] in object space and faces [F, 3], and what the file has of colors [V, 3] or face_colors [F, 3],
-    opacities [V] or face_opacities [F], texcoords [T, 2] with face_texcoords [F, 3], textures (a list of [H, W, 3], linear
-    RGB, or with opacity [H, W, 4]), wrap and filter (a list of words), face_textures [F], materials and face_materials
-    [F]: NumPy's float32 and int64, as Renderer has them. Polygons become fans of triangles. A UserWarning tells what is
-    left out. Raises OSError (dpr.IoError) where the file is missing or malformed, ValueError (dpr.InvalidArgument) where
-    it cannot be rendered.
+    opacities [V] or face_opacities [F], texcoords [T, 2] with face_texcoords [F, 3], textures (a list of [H, W, 3],
+    linear RGB, or with opacity [H, W, 4]), wrap and filter (a list of words), face_textures [F], materials and
+    face_materials [F]: NumPy's float32 and int64, as Renderer has them. Polygons become fans of triangles. A
+    UserWarning tells what is left out. Raises OSError (dpr.IoError) where the file is missing or malformed,
+    ValueError (dpr.InvalidArgument) where it cannot be rendered.
     """
     handle = ctypes.c_void_p()
     _library.call("dpr_mesh_file_read", os.fsencode(file), ctypes.byref(handle))
