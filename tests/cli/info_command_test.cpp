@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
 #include "support/command.hpp"
 #include "support/messages.hpp"
@@ -74,11 +75,13 @@ TEST_SUITE("pipeline") {
     CHECK(!notes(info(folder, "opaque.gltf"), "opacities below 1"));
     CHECK(notes(info(folder, "blend.gltf"), "opacities below 1"));
     CHECK(run_command(folder, {"render", "opaque.gltf", "-o", "a.png"}).status == 0);
-    const auto refused = run_command(folder, {"render", "blend.gltf", "-o", "b.png"});
+    const auto refused = run_command(folder, {"render", "blend.gltf", "--preset", "pixel", "-o", "b.png"});
     CHECK(refused.status != 0);
     CHECK(contains(refused.err, "joint_gaussian"));
-    CHECK(run_command(folder, {"render", "blend.gltf", "--preset", "joint_gaussian", "-o", "b.png"}).status ==
-          0);
+    CHECK(run_command(folder, {"render", "blend.gltf", "-o", "b.exr"}).status == 0);
+    const dpr::Image image = dpr::read_image(folder / "b.exr");
+    const auto alpha = std::ranges::max(image.pixels, {}, [](const glm::vec4& p) { return p.w; }).w;
+    CHECK(alpha == doctest::Approx(0.5).epsilon(0.01));
     const auto pose = [&](const std::string& file) {
       folder.write("scene.json", R"({"width": 24, "height": 24, "smoothing": {"preset": "joint_gaussian"},
         "camera": {"view": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -4], [0, 0, 0, 1]], "znear": 1, "zfar": 9},
