@@ -2,7 +2,7 @@
 # Draws the pictures of include/examples by running the tutorials in full. From the repository's root, after
 # `cmake --build --preset release`; the tutorials in PyTorch need a python3 that has torch.
 #
-#   bench/report/tutorials.sh [TUTORIAL...]    first pose mesh texture shading training materials glass light unless given
+#   bench/report/tutorials.sh [TUTORIAL...]    all unless given, by the names of their files
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -32,7 +32,7 @@ plot $(IFS=,; echo "${plots[*]}")
 END
 }
 
-(($#)) || set -- first pose mesh texture shading training materials glass light
+(($#)) || set -- first pose track mesh texture shading training materials glass light
 for name in "$@"; do
   program=build/release/bin/dpr_document_tutorial_$name
   options=()
@@ -47,6 +47,16 @@ for name in "$@"; do
     training) draw training 1 768 96 unseen.png "pictures it has not seen" predicted.png "the poses that it says" ;;
     pose) draw pose 4 144 144 pose/target.png "the photograph" pose/start.png "the start" \
       pose/end.png "the pose found" found.png "in the light found" ;;
+    track)
+      PYTHONPATH=$OLDPWD/build/release/python python3 - <<END
+import dpr
+
+strip = dpr.read_image("track/frames.png")  # 480 pixels a frame, 2 between them
+for i in (0, 5, 10, 15):
+    dpr.write_image(f"shown{i}.png", strip[::2, 482 * i:482 * i + 480:2, :3])
+END
+      draw track 4 240 240 shown0.png "the first frame" shown5.png "a third on" shown10.png "two thirds on" \
+        shown15.png "the last frame" ;;
     mesh) draw mesh 1 782 96 fit/targets.png "eight of the views" fit/results.png "the mesh found, from the same sides" ;;
     texture) draw texture 4 160 160 truth.png "the picture" step0.png "step 0" step10.png "step 10" step60.png "step 60" ;;
     shading) draw shading 3 160 160 truth.png "the picture" start.png "the first guess" found.png "found" ;;
