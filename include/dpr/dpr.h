@@ -120,11 +120,10 @@ typedef enum dpr_filter { DPR_FILTER_NEAREST, DPR_FILTER_BILINEAR, DPR_FILTER_TR
 
 /* Texture coordinates (u, v) have v up: (0, 0) is the lower left corner of the image. */
 typedef struct dpr_texture {
-  int width, height;      /* 1 to 16384 */
-  const float* texels;    /* [height][width][3], row 0 on top */
-  int wrap;               /* a dpr_wrap */
-  int filter;             /* a dpr_filter */
-  const float* opacities; /* [height][width], from 0 to 1; NULL: opaque */
+  int width, height;   /* 1 to 16384 */
+  const float* texels; /* [height][width][3], row 0 on top */
+  int wrap;            /* a dpr_wrap */
+  int filter;          /* a dpr_filter */
 } dpr_texture;
 
 /* The texture of a face that has none. */
@@ -158,15 +157,16 @@ typedef struct dpr_mesh {
   const uint32_t* face_normals;  /* [face][3], indices of normals, or NULL */
   const dpr_material* materials; /* [material_count], or NULL */
   size_t material_count;
-  const uint32_t* face_materials; /* [face], indices of materials; NULL: all the first */
-  const float* vertex_opacities;  /* [vertex], from 0 to 1, or NULL */
-  const float* face_opacities;    /* [face], or NULL; at most one of the two */
+  const uint32_t* face_materials;      /* [face], indices of materials; NULL: all the first */
+  const float* vertex_opacities;       /* [vertex], from 0 to 1, or NULL */
+  const float* face_opacities;         /* [face], or NULL; at most one of the two */
+  const float* const* texel_opacities; /* [texture_count] of [height][width], from 0 to 1, or NULL */
 } dpr_mesh;
 
 #define DPR_MESH_INIT                                                                                        \
   {                                                                                                          \
     sizeof(dpr_mesh), NULL, 0, NULL, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, 0, NULL, NULL, \
-        0, NULL, NULL, NULL                                                                                  \
+        0, NULL, NULL, NULL, NULL                                                                            \
   }
 
 typedef enum dpr_shading {

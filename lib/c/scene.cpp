@@ -100,7 +100,7 @@ std::vector<glm::uvec3> to_indices(const std::uint32_t* values, std::size_t coun
   return indices;
 }
 
-Texture to_texture(const dpr_texture& given, const std::string& argument) {
+Texture to_texture(const dpr_texture& given, const float* opacities, const std::string& argument) {
   deref(given.texels, (argument + ".texels").c_str());
   Texture texture{.width = given.width,
                   .height = given.height,
@@ -111,7 +111,7 @@ Texture to_texture(const dpr_texture& given, const std::string& argument) {
   if (can_be_side(given.width) && can_be_side(given.height)) {  // validate() tells of others
     const auto rows = static_cast<std::size_t>(given.height), columns = static_cast<std::size_t>(given.width);
     texture.texels = triples(given.texels, rows * columns);
-    if (given.opacities) texture.opacities.assign(given.opacities, given.opacities + rows * columns);
+    if (opacities) texture.opacities.assign(opacities, opacities + rows * columns);
   }
   return texture;
 }
@@ -123,8 +123,11 @@ void copy_textures(const dpr_mesh& given, Mesh& mesh) {
     mesh.texcoords = to_pairs({given.texcoords, 2 * given.texcoord_count});
   }
   if (given.face_texcoords) mesh.face_texcoords = to_indices(given.face_texcoords, given.face_count);
-  for (const dpr_texture& texture : span_of(given.textures, given.texture_count, "mesh.textures"))
-    mesh.textures.push_back(to_texture(texture, checks::element("mesh.textures", mesh.textures.size())));
+  for (const dpr_texture& texture : span_of(given.textures, given.texture_count, "mesh.textures")) {
+    const std::size_t i = mesh.textures.size();
+    mesh.textures.push_back(to_texture(texture, given.texel_opacities ? given.texel_opacities[i] : nullptr,
+                                       checks::element("mesh.textures", i)));
+  }
   if (given.face_textures)
     mesh.face_textures.assign(given.face_textures, given.face_textures + given.face_count);
 }

@@ -153,7 +153,7 @@ static const float texcoords[] = {0, 0, 1, 0, 0.5f, 1};
 static const float texels[] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}; /* red, green; blue, white */
 
 static dpr_texture four_texels(void) {
-  dpr_texture texture = {2, 2, NULL, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR, NULL};
+  dpr_texture texture = {2, 2, NULL, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR};
   texture.texels = texels;
   return texture;
 }
@@ -1064,7 +1064,8 @@ static void test_setters(const dpr_device* device) {
   const dpr_camera camera = three_units_away();
   dpr_point_light light = {{1, 2, 4}, {0.6f, 0.6f, 0.6f}, {0.5f, 0.5f, 0.5f}};
   dpr_lights lights = DPR_LIGHTS_INIT;
-  dpr_texture leaf = {2, 1, texels, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR, NULL};
+  const dpr_texture leaf = {2, 1, texels, DPR_WRAP_CLAMP, DPR_FILTER_BILINEAR};
+  const float* of_leaf[1];
   dpr_mesh mesh = triangle();
   float image[FLOATS];
   size_t count = 0;
@@ -1079,7 +1080,8 @@ static void test_setters(const dpr_device* device) {
     mesh.materials = is_new ? bright : dull, mesh.material_count = 1;
     mesh.face_materials = of_face;
     mesh.vertex_opacities = is_new ? clear : opaque;
-    leaf.opacities = mesh.vertex_opacities;
+    of_leaf[0] = mesh.vertex_opacities;
+    mesh.texel_opacities = of_leaf;
     mesh.texcoords = texcoords, mesh.texcoord_count = 2, mesh.face_texcoords = corners;
     mesh.textures = &leaf, mesh.texture_count = 1;
     OK(dpr_scene_create(SIDE, SIDE, &scene));
