@@ -79,7 +79,7 @@ class Frames {
     beside_.push_back({option, Sequence(option, names, scene, reader), member});
     const std::size_t count = *beside_.back().sequence.size();
     if (!size() || count == *size()) return;
-    throw InvalidArgument(std::string(option) + " (command line)", std::to_string(count) + " images",
+    throw InvalidArgument("images of " + std::string(option) + " (command line)", std::to_string(count),
                           std::to_string(*size()) + ", one for each frame");
   }
 

@@ -83,14 +83,14 @@ class Outliner {
   Renderer renderer_;
 };
 
-/// "0 to 20, 31 to 59" of frames whose status is one; "none".
+/// "frames 0 to 20, 31 to 59" whose status is one; "none".
 std::string frames_text(const std::vector<TrackRow>& rows, TrackStatus status) {
   std::string text;
   for (std::size_t i = 0; i < rows.size();) {
     std::size_t end = i;
     while (end < rows.size() && rows[end].found.status == status) ++end;
     if (end > i) {
-      text += (text.empty() ? "" : ", ") + std::to_string(rows[i].frame);
+      text += (text.empty() ? "frames " : ", ") + std::to_string(rows[i].frame);
       if (end > i + 1) text += " to " + std::to_string(rows[end - 1].frame);
     }
     i = std::max(end, i + 1);

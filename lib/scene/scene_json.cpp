@@ -15,6 +15,7 @@
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
+#include "scene/see_through.hpp"
 #include "scene/take_json.hpp"
 #include "smoothing/choice_names.hpp"
 #include "smoothing/option_fields.hpp"
@@ -332,7 +333,9 @@ Scene parse_scene(const std::filesystem::path& file, std::string_view text, Note
   const std::string note = noise_note(smoothing, overrides.smoothing);
   if (!note.empty()) notes.push_back(note);
   with_keys_of(file, smoothing, overrides.smoothing, [&] {
-    scene.smoothing = resolve_smoothing(overlay(smoothing, overrides.smoothing), scene.width, scene.height);
+    SmoothingOptions all = overlay(smoothing, overrides.smoothing);
+    if (says_nothing(all) && is_see_through(scene)) all.preset = "joint_gaussian";
+    scene.smoothing = resolve_smoothing(all, scene.width, scene.height);
     validate(scene);
   });
   return scene;

@@ -333,7 +333,8 @@ TEST_SUITE("robustness") {
     check("--sequence frames --depth film.mp4 --depth-scale 1",
           "--depth film.mp4 (command line): got a video");
     check("--sequence frames --silhouette masks/f8.png",
-          "--silhouette (command line): got 1 images, expected 5");
+          "images of --silhouette (command line): got 1, expected 5");
+    check("--sequence frames --depth nowhere", "nowhere: the file does not exist");
     check("--sequence frames --silhouette missing%d.png",
           "--silhouette missing%d.png (command line): got no file that matches");
   }
