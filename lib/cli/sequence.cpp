@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string_view>
 #include <system_error>
@@ -37,7 +38,8 @@ bool is_image(const std::filesystem::path& file) {
   return has_extension(file, extensions);
 }
 
-/// Entries of a folder that hold images, in natural order.
+/// Entries of a folder that hold images, in natural order, but for "a.depth.exr" and the like beside "a.png", which
+/// `dpr render --aov` leaves there.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   std::error_code error;
   std::vector<std::filesystem::path> files;
@@ -47,6 +49,12 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
       files.push_back(entry->path());
   }
   if (error) throw IoError(folder, error.message());
+  std::set<std::filesystem::path> stems;
+  for (const std::filesystem::path& file : files) stems.insert(file.stem());
+  std::erase_if(files, [&](const std::filesystem::path& file) {
+    const std::filesystem::path stem = file.stem();
+    return file.extension() == ".exr" && stem.has_extension() && stems.contains(stem.stem());
+  });
   std::ranges::sort(files, [](const auto& a, const auto& b) {
     return is_naturally_less(a.filename().string(), b.filename().string());
   });

@@ -221,8 +221,9 @@ void add_track_command(CLI::App& application, CommonOptions& common) {
   command
       ->add_option(
           "--sequence", options->sequence,
-          "Frames of the scene's size: files; a folder, whose images are taken in natural order; a pattern "
-          "such as 'frames/%04d.png' or 'frames/####.png', all numbers from the lowest to the highest; or a "
+          "Frames of the scene's size: files; a folder, whose images are taken in natural order, but for "
+          "those that --aov leaves beside them; a pattern such as 'frames/%04d.png' or 'frames/####.png', "
+          "all numbers from the lowest to the highest; or a "
           "video, if OpenImageIO was built with FFmpeg")
       ->required()
       ->type_name("FILE");

@@ -155,7 +155,9 @@ TEST_SUITE("unit") {
     const auto write = [&](const char* name) {
       dpr::write_image(folder / name, dpr::Image(2, 1, glm::vec4(1)));
     };
-    for (const char* name : {"f9.png", "f10.png", "f11.png", "g010.exr", "g009.exr"}) write(name);
+    for (const char* name :
+         {"f9.png", "f9.depth.exr", "f10.png", "f11.png", "g010.exr", "g009.exr", "g009.uv.exr"})
+      write(name);
     folder.write("notes.txt", "");
     const auto read = [&](const std::vector<std::string>& names) {
       std::vector<std::string> paths, files;
@@ -171,6 +173,7 @@ TEST_SUITE("unit") {
     CHECK(read({""}) == Files{"f9.png", "f10.png", "f11.png", "g009.exr", "g010.exr"});
     CHECK(read({"f%d.png"}) == Files{"f9.png", "f10.png", "f11.png"});
     CHECK(read({"g%03d.exr"}) == Files{"g009.exr", "g010.exr"});
+    CHECK(read({"f9.depth.exr"}) == Files{"f9.depth.exr"});
     CHECK(read({"g###.exr", "f9.png"}) == Files{"g009.exr", "g010.exr", "f9.png"});
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read({"f%03d.png"}), "got no file that matches");
     std::filesystem::remove(folder / "f10.png");
