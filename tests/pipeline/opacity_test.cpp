@@ -17,6 +17,7 @@
 #include "dpr/scene_batch.hpp"
 #include "dpr/subdivision.hpp"
 #include "mesh/cluster_vertices.hpp"
+#include "pipeline/reference_comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
@@ -75,12 +76,6 @@ Scene crossing_sheets(Composition composition) {
   return scene;
 }
 
-Scene lit(Scene scene) {
-  scene.lights = two_lights(Shading::phong);
-  scene.gradients.lights = true;
-  return scene;
-}
-
 double largest_difference(const Image& a, const Image& b) {
   double largest = 0;
   for (std::size_t i = 0; i < a.pixels.size(); ++i) {
@@ -90,51 +85,17 @@ double largest_difference(const Image& a, const Image& b) {
   return largest;
 }
 
-void check_against_reference(const std::string& name, const Scene& scene) {
-  CAPTURE(name);
-  const reference::Scene twin = to_reference(scene);
-  const Delicate delicate = delicate_pixels(twin);
-  Renderer renderer(open_device());
-  renderer.set_scene(scene);
-  renderer.forward();
-  const Image image = renderer.image();
-  const reference::Image expected = reference::render(twin);
-  double largest = 0;
-  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
-    if (delicate.jump[i / 4]) continue;
-    const double difference = std::abs(double(image.pixels[i / 4][int(i % 4)]) - expected.rgba[i]);
-    if (!(difference <= largest)) largest = difference;  // NaN is the largest of all
-  }
-  CHECK(largest < 1e-4);
-
-  Image grad_image = random_image(scene.width, scene.height, -1.0F, 1.0F);
-  for (std::size_t i = 0; i < grad_image.pixels.size(); ++i)
-    if (delicate.kink[i]) grad_image.pixels[i] = glm::vec4(0);
-  const SceneGradient found = renderer.backward(std::span(&grad_image, 1));
-  double worst = 0, of_opacities = 0;
-  for (const Block& block : blocks_of(found, reference::gradient(twin, to_reference(grad_image)))) {
-    CAPTURE(block.name);
-    const double error = block_error(block, 1e-3);
-    CHECK(error < 1e-3);
-    worst = std::max(worst, error);
-    if (block.name != "opacities") continue;
-    CHECK(norm(block.expected) > 0.1);
-    of_opacities = std::max(of_opacities, error);
-  }
-  MESSAGE(name << ": image " << largest << ", gradients " << worst << ", of opacities " << of_opacities);
-}
-
 }  // namespace
 
 TEST_SUITE("opacity") {
   TEST_CASE("opacity: images and gradients are the reference's, lit or not, in both compositions") {
     for (const Composition composition : {Composition::joint, Composition::barrier}) {
       const std::string name = composition == Composition::joint ? "joint" : "barrier";
-      check_against_reference(name + ", sheet and sphere", sheet_and_sphere(composition));
-      check_against_reference(name + ", crossing sheets, lit", lit(crossing_sheets(composition)));
+      check_opacities(name + ", sheet and sphere", sheet_and_sphere(composition), "opacities", 0.1);
+      check_opacities(name + ", crossing sheets, lit", lit(crossing_sheets(composition)), "opacities", 0.1);
       if (dpr::test::is_reduced()) continue;
-      check_against_reference(name + ", sheet and sphere, lit", lit(sheet_and_sphere(composition)));
-      check_against_reference(name + ", crossing sheets", crossing_sheets(composition));
+      check_opacities(name + ", sheet and sphere, lit", lit(sheet_and_sphere(composition)), "opacities", 0.1);
+      check_opacities(name + ", crossing sheets", crossing_sheets(composition), "opacities", 0.1);
     }
   }
 

@@ -14,6 +14,7 @@
 #include "dpr/dpr.hpp"
 #include "dpr/multi_device.hpp"
 #include "pipeline/directions.hpp"
+#include "pipeline/reference_comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
@@ -55,53 +56,6 @@ Scene leaf_and_sphere(Composition composition, Wrap wrap, Filter filter) {
   return scene;
 }
 
-Scene lit(Scene scene) {
-  scene.lights = two_lights(Shading::phong);
-  scene.gradients.lights = true;
-  return scene;
-}
-
-double difference_from_reference(const Scene& scene, const Image& image, const Delicate& delicate) {
-  const reference::Image expected = reference::render(to_reference(scene));
-  double largest = 0;
-  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
-    if (delicate.jump[i / 4]) continue;
-    const double difference = std::abs(double(image.pixels[i / 4][int(i % 4)]) - expected.rgba[i]);
-    if (!(difference <= largest)) largest = difference;  // NaN is the largest of all
-  }
-  return largest;
-}
-
-void check_against_reference(const std::string& name, const Scene& scene) {
-  CAPTURE(name);
-  const reference::Scene twin = to_reference(scene);
-  const Delicate delicate = delicate_pixels(twin);
-  Renderer renderer(open_device());
-  renderer.set_scene(scene);
-  renderer.forward();
-  const double of_image = difference_from_reference(scene, renderer.image(), delicate);
-  CHECK(of_image < 1e-4);
-  Image grad = random_image(scene.width, scene.height, -1, 1);
-  for (std::size_t i = 0; i < grad.pixels.size(); ++i)
-    if (delicate.kink[i]) grad.pixels[i] = glm::vec4(0);
-  const SceneGradient found = renderer.backward(std::span(&grad, 1));
-  double worst = 0, of_opacities = 0;
-  std::size_t of_texels = 0;
-  for (const Block& block : blocks_of(found, reference::gradient(twin, to_reference(grad)))) {
-    CAPTURE(block.name);
-    const double error = block_error(block, 1e-3);
-    CHECK(error < 1e-3);
-    worst = std::max(worst, error);
-    if (block.name != "texel opacities") continue;
-    CHECK(norm(block.expected) > 0.05);
-    of_opacities = error;
-    ++of_texels;
-  }
-  CHECK(of_texels == 1);
-  MESSAGE(name << ": image " << of_image << ", gradients " << worst << ", of texels' opacities "
-               << of_opacities);
-}
-
 /// Of the mesh in front, by the numbers that the reference's gradient lacks under trilinear filtering.
 std::vector<Direction> directions(const SceneGradient& g) {
   const MeshGradient& mesh = g.meshes[1];
@@ -131,10 +85,11 @@ TEST_SUITE("opacity") {
   TEST_CASE("texels' opacity: images and gradients are the reference's, lit or not, in both compositions") {
     for (const Composition composition : {Composition::joint, Composition::barrier}) {
       const std::string name = composition == Composition::joint ? "joint" : "barrier";
-      check_against_reference(name + ", bilinear",
-                              leaf_and_sphere(composition, Wrap::repeat, Filter::bilinear));
-      check_against_reference(name + ", nearest, lit",
-                              lit(leaf_and_sphere(composition, Wrap::mirror, Filter::nearest)));
+      CHECK(check_opacities(name + ", bilinear", leaf_and_sphere(composition, Wrap::repeat, Filter::bilinear),
+                            "texel opacities", 0.05) == 1);
+      CHECK(check_opacities(name + ", nearest, lit",
+                            lit(leaf_and_sphere(composition, Wrap::mirror, Filter::nearest)),
+                            "texel opacities", 0.05) == 1);
     }
   }
 
@@ -149,7 +104,8 @@ TEST_SUITE("opacity") {
       Renderer renderer(open_device());
       renderer.set_scene(scene);
       renderer.forward();
-      CHECK(difference_from_reference(scene, renderer.image(), delicate_pixels(to_reference(scene))) < 1e-4);
+      const reference::Scene twin = to_reference(scene);
+      CHECK(image_error(renderer.image(), reference::render(twin), delicate_pixels(twin)).largest < 1e-4);
       const Image weights = random_image(scene.width, scene.height, -1, 1);
       for (const Direction& block : directions(renderer.backward(std::span(&weights, 1)))) {
         const double error = error_along(scene, block, weights, 0);

@@ -9,6 +9,7 @@
 
 #include "check/comparison.hpp"
 #include "dpr/dpr.hpp"
+#include "pipeline/reference_comparison.hpp"
 #include "pipeline/scenes.hpp"
 #include "support/reduced.hpp"
 
@@ -62,24 +63,6 @@ class Worst {
   std::map<std::string, Entry> entries_;
 };
 
-struct ImageError {
-  double largest = 0, mean = 0;
-};
-
-/// Over all pixels but those where the image itself jumps.
-ImageError image_error(const Image& found, const reference::Image& expected, const Delicate& delicate) {
-  ImageError error;
-  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
-    if (delicate.jump[i / 4]) continue;
-    const double value = found.pixels[i / 4][static_cast<int>(i % 4)];
-    const double difference = std::fabs(value - expected.rgba[i]);
-    // Written so that NaN is the largest of all.
-    if (!(difference <= error.largest)) error.largest = difference;
-    error.mean += difference / static_cast<double>(expected.rgba.size());
-  }
-  return error;
-}
-
 /// Renders a scene twice and compares image and gradients for a random derivative of the image.
 void check_scene(const Device& device, const std::string& name, const Scene& scene, Worst& worst) {
   CAPTURE(name);
@@ -98,10 +81,7 @@ void check_scene(const Device& device, const std::string& name, const Scene& sce
   worst.add("image, largest", name, image.largest, k_image_largest * slack);
   worst.add("image, mean", name, image.mean, k_image_mean * slack);
 
-  Image grad_image = random_image(scene.width, scene.height, -1.0F, 1.0F);
-  for (std::size_t i = 0; i < grad_image.pixels.size(); ++i) {
-    if (delicate.kink[i]) grad_image.pixels[i] = glm::vec4(0);
-  }
+  const Image grad_image = smooth_grad_image(scene, delicate);
   const SceneGradient found = renderer.backward(std::span(&grad_image, 1));
   for (const Block& block : blocks_of(found, reference::gradient(twin, to_reference(grad_image)))) {
     CAPTURE(block.name);
