@@ -190,8 +190,7 @@ Sequence::Sequence(const char* option, const std::vector<std::string>& names, co
   const auto video = std::ranges::find_if(files_, is_video);
   if (video != files_.end())
     throw InvalidArgument(named(option, video->string()), "a video", "an image for each frame");
-  for (const std::filesystem::path& file : files_)
-    if (!std::filesystem::exists(file)) throw IoError(file, "the file does not exist");
+  std::ranges::for_each(files_, require_file);
 }
 
 std::optional<SequenceFrame> Sequence::next() {

@@ -2,9 +2,14 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "dpr/mesh.hpp"
 #include "dpr/notes.hpp"

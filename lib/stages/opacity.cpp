@@ -57,19 +57,8 @@ void Opacity::backward(const SurfaceArguments& in, const Geometry& geometry, con
 void Opacity::list_texels(const SurfaceArguments& in, Surface& surface, const Bin& bin,
                           const Rasterize& rasterize) {
   surface.start_list(in.p, rasterize);
-  texture_kernels()(rasterize.pairs(bin), kernel::opacity_texels_list{.p = in.p,
-                                                                      .pairs = in.pairs,
-                                                                      .pair_face = in.pair_face,
-                                                                      .fragment_starts = in.fragment_starts,
-                                                                      .faces = in.faces,
-                                                                      .texcoords = in.texcoords,
-                                                                      .textures = in.textures,
-                                                                      .triangles = in.triangles,
-                                                                      .clipped = in.clipped,
-                                                                      .fragments = in.fragments,
-                                                                      .grads = in.grads,
-                                                                      .cells = surface.cells,
-                                                                      .seen = surface.seen});
+  texture_kernels()(rasterize.pairs(bin),
+                    kernel::opacity_texels_list::pick(SurfaceListArguments{in, surface.cells, surface.seen}));
   surface.finish_list(in, bin, rasterize);
 }
 

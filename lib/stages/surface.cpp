@@ -20,20 +20,7 @@ void Surface::backward_detail(const SurfaceArguments& in, const Range& pairs, Bu
 void Surface::list(const SurfaceArguments& in, const Range& pairs, const Bin& bin,
                    const Rasterize& rasterize) {
   start_list(in.p, rasterize);
-  launch_(pairs, kernel::surface_list{.p = in.p,
-                                      .pairs = in.pairs,
-                                      .pair_face = in.pair_face,
-                                      .fragment_starts = in.fragment_starts,
-                                      .faces = in.faces,
-                                      .colors = in.colors,
-                                      .texcoords = in.texcoords,
-                                      .textures = in.textures,
-                                      .triangles = in.triangles,
-                                      .clipped = in.clipped,
-                                      .fragments = in.fragments,
-                                      .grads = in.grads,
-                                      .cells = cells,
-                                      .seen = seen});
+  launch_(pairs, kernel::surface_list::pick(SurfaceListArguments{in, cells, seen}));
   finish_list(in, bin, rasterize);
 }
 

@@ -30,6 +30,12 @@ struct SurfaceTangentArguments : SurfaceArguments {
   Buffer<float>& tangents;
 };
 
+/// The same for those that list the texels which fragments see.
+struct SurfaceListArguments : SurfaceArguments {
+  Buffer<cl_uint>& cells;
+  Buffer<shared::SeenTexels>& seen;
+};
+
 class Surface {
  public:
   explicit Surface(Device::Impl& device) : device_(device), launch_(device) {}
