@@ -65,8 +65,13 @@ def write_cpp(document, output):
     output.write_text(source)
 
 
-def make_programs(folder, build, is_reduced):
-    """The programs under their names, with what reduces them."""
+def make_script(file, lines):
+    file.write_text("#!/bin/sh\n" + lines)
+    file.chmod(file.stat().st_mode | stat.S_IXUSR)
+
+
+def make_programs(folder, build, is_reduced, python):
+    """The programs under their names, with what reduces them, and `python3` as the interpreter that has the modules."""
     folder.mkdir()
     for program in ("dpr", "dpr_experiments", "dpr_pose_table"):
         cases = []
@@ -76,9 +81,9 @@ def make_programs(folder, build, is_reduced):
                 continue
             pattern = " ".join(words[1:]) + (" *" if words[1:] else "*")
             cases.append(f'  "{pattern}") set -- "$@" {options} ;;'.replace('*"', '"*'))
-        script = folder / program
-        script.write_text("#!/bin/sh\ncase \"$*\" in\n" + "\n".join(cases) + f'\nesac\nexec {build}/bin/{program} "$@"\n')
-        script.chmod(script.stat().st_mode | stat.S_IXUSR)
+        lines = "case \"$*\" in\n" + "\n".join(cases) + "\nesac\n"
+        make_script(folder / program, f'{lines}exec {build}/bin/{program} "$@"\n')
+    make_script(folder / "python3", f'exec {python} "$@"\n')
 
 
 def require_ignored(source, work, kept):
@@ -99,7 +104,7 @@ def run(arguments):
     (work / "build/release").symlink_to(build)
     for folder in ("bench", "include", "tests"):
         (work / folder).symlink_to(arguments.source.resolve() / folder)
-    make_programs(work / "programs", build, not arguments.full)
+    make_programs(work / "programs", build, not arguments.full, arguments.python or sys.executable)
     environment = {**os.environ, "PATH": f"{(work / 'programs').resolve()}:{os.environ['PATH']}",
                    "PYTHONPATH": "build/release/python"}
 
