@@ -1,6 +1,7 @@
 // Images of attributes (include/dpr/attribute_images.hpp): their alpha in the barrier composition, and what a
 // loss compares of them.
 #include "face_normal.h"
+#include "face_rows.h"
 #include "shared_types.h"
 #include "world_tangents.h"
 
@@ -133,7 +134,7 @@ kernel void attribute_normals_forward(const FrameParams p, const uint shown_view
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
-  const float3 normal = face_normal(world + view * p.vertices, faces[i % p.faces]);
+  const float3 normal = face_normal(world + view * p.vertices, faces[row_of_face(p, i)]);
   colors[i] = (float4)(view < shown_views ? normal * inverse_length(normal) : (float3)(1.0f), 0.0f);
 }
 
@@ -154,16 +155,18 @@ kernel void attribute_normals_backward(const FrameParams p, const uint shown_vie
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
   float3 sum = (float3)(0.0f);
-  const uint last = view < shown_views ? corner_starts[vertex + 1] : corner_starts[vertex];
-  for (uint k = corner_starts[vertex]; k < last; ++k) {
-    const uint face = corners[k] / 3, at = corners[k] % 3;
+  global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
+  const uint last = view < shown_views ? run[1] : run[0];
+  for (uint k = run[0]; k < last; ++k) {
+    const uint row = corners[k] / 3, at = corners[k] % 3;
+    const uint4 face = faces[row];
     global const float4* of_view = world + view * p.vertices;
-    const float3 normal = face_normal(of_view, faces[face]), grad = grad_colors[view * p.faces + face].xyz;
+    const float3 normal = face_normal(of_view, face),
+                 grad = grad_colors[view * p.faces + row - first_row(p, view)].xyz;
     const float scale = inverse_length(normal);
     const float3 unit = normal * scale, g = scale * (grad - unit * dot(unit, grad));
     // cross(b - a, c - a) . g has the gradient cross(b - c, g) by a, and so on around the face.
-    sum += cross(
-        corner_at(of_view, faces[face], (at + 1) % 3) - corner_at(of_view, faces[face], (at + 2) % 3), g);
+    sum += cross(corner_at(of_view, face, (at + 1) % 3) - corner_at(of_view, face, (at + 2) % 3), g);
   }
   grad_world[i] = (float4)(sum, 0.0f);
 }
@@ -179,7 +182,7 @@ kernel void attribute_normals_tangent(const FrameParams p, const TangentParams q
   const uint i = (uint)get_global_id(0), count = p.views * p.faces;
   if (i >= q.directions * count) return;
   const uint direction = i / count, view = i % count / p.faces;
-  const uint4 face = faces[i % p.faces];
+  const uint4 face = faces[row_of_face(p, i % count)];
   global const float4* const of_view = world + view * p.vertices;
   global const float4* const moved = world_tangents + world_tangents_at(p, direction) + view * p.vertices;
   const float3 along1 = corner_at(of_view, face, 1) - corner_at(of_view, face, 0);

@@ -1,6 +1,7 @@
 // Auxiliary outputs of a pixel from the weights of its fragments: expected depth and normal, the face of the
 // largest weight with its barycentrics, the effective number of faces.
 #include "face_normal.h"
+#include "face_rows.h"
 #include "shared_types.h"
 
 /// 0 for vectors without a length.
@@ -48,7 +49,7 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
     sum += w;
     squares += w * w;
     depth_sum += w * depth[k];
-    normal += w * normalized(face_normal(vertices, faces[face]));
+    normal += w * normalized(face_normal(vertices, faces[first_row(p, pixel / pixels_per_view) + face]));
     if (w <= largest) continue;
     largest = w;
     seen = face;

@@ -6,6 +6,7 @@
 // These kernels follow those that treat every face as whole, and replace what they left of clipped ones.
 // Gradients go by way of the cuts to the corners on both sides of the plane (clip.h).
 #include "clipped_view.h"
+#include "face_rows.h"
 #include "setup.h"
 
 /// A cut between a corner that is kept and one that is not. The same for all faces that share the two. Not
@@ -62,7 +63,7 @@ kernel void clip_forward(const FrameParams p, global const ViewParams* restrict 
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.faces) return;
   const uint view = i / p.faces;
-  global const uint4* const face = faces + (i - view * p.faces);
+  global const uint4* const face = faces + row_of_face(p, i);
   const uint vertex[3] = {face->x, face->y, face->z};
   global const float4 *const view_ndc = ndc + view * p.vertices, *const view_world =
                                                                      world + view * p.vertices;

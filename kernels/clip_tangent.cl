@@ -1,5 +1,6 @@
 // Forward mode of clip.cl: tangents of the fragments of faces that cross the near plane, by way of their cuts.
 #include "clipped_view.h"
+#include "face_rows.h"
 
 /// Tangents of an outline: x, y (NDC) and depth of its corners; the first two have those of the cuts' parts in w.
 #define DPR_OUTLINE_CORNERS 4
@@ -20,7 +21,7 @@ kernel void clip_outline_tangent(
   if (i >= p.views * p.faces || clipped[i].corners == 0) return;
   const uint view = i / p.faces;
   const ClippedFace c = clipped[i];
-  global const uint4* const face = faces + (i - view * p.faces);
+  global const uint4* const face = faces + row_of_face(p, i);
   for (uint d = 0; d < q.directions; ++d) {
     const size_t of_view = (size_t)d * p.views + view;
     global const float4 *ndc = vertices + of_view * p.vertices, *clip = clip_vertices + of_view * p.vertices;

@@ -104,8 +104,8 @@ static inline ContourScene scene_of_view(const FrameParams p, uint view, global 
   s.facing = facing + view * p.faces;
   s.ndc = ndc + view * p.vertices;
   s.world = world + view * p.vertices;
-  s.faces = faces;
-  s.face_colors = faces + p.color_faces;
+  s.faces = faces + first_row(p, view);
+  s.face_colors = s.faces + p.color_faces;
   s.colors = colors + view * p.color_stride;
   s.edges = edges_of_view(p, view, edges, faces, ndc, clipped);
   return s;
@@ -259,7 +259,8 @@ kernel void contour_fill(const FrameParams p, const uint capacity, global const 
   const uint first_edge = view * p.edges;
   const ViewEdge edge = view_edge(s, i - first_edge);
   uint contour = DPR_CONTOUR_FLAGS * i + kinds[i];
-  const Contours contours = {s, face_edges, corner_starts, corners, offsets + first_edge};
+  const Contours contours = {s, face_edges, starts_of_view(p, view, p.vertices, corner_starts), corners,
+                             offsets + first_edge};
   if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
   if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
@@ -300,12 +301,13 @@ kernel void contour_gather(const FrameParams p, global const uint* restrict pair
     const uint contour = pair_contour[pair] / DPR_CONTOUR_FLAGS, view = contour / p.edges;
     const uint own = contour - view * p.edges;
     if (own >= p.mesh_edges || edge_pairs[pair_starts[contour]] != pair) continue;
-    const uint4 record = record_of(edges_of_shape(p, view, edges)[own], faces);
-    const uint vertex = i % 2 == 0 ? record.x : record.y, last = 2 * corner_starts[vertex + 1];
+    const uint4 record = record_of(edges_of_shape(p, view, edges)[own], faces + first_row(p, view));
+    const uint vertex = i % 2 == 0 ? record.x : record.y;
+    global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
     global const uint* starts = pair_starts + view * p.edges;
     uint first = DPR_NO_MESH_EDGE;
     float2 sum = 0.0f;
-    for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
+    for (uint k = 2 * run[0]; k < 2 * run[1]; ++k) {
       const uint edge = edge_at(face_edges, corners[k / 2], k % 2);
       if (edge == DPR_NO_MESH_EDGE || starts[edge] == starts[edge + 1]) continue;
       first = min(first, edge);
@@ -343,8 +345,9 @@ kernel void contour_drop_near(const FrameParams p, global const ClippedFace* res
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
-  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
-    global const ClippedFace* face = clipped + view * p.faces + corners[k] / 3;
+  global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
+  for (uint k = run[0]; k < run[1]; ++k) {
+    global const ClippedFace* face = clipped + view * p.faces + corners[k] / 3 - first_row(p, view);
     if (face->corners != 0 && is_lost(*face, corners[k] % 3)) grad_ndc[i] = 0.0f;
   }
 }
@@ -368,10 +371,11 @@ kernel void contour_gather_cuts(const FrameParams p, global const ViewParams* re
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices, first_edge = view * p.edges;
   const EdgeScene s = edges_of_view(p, view, edges, faces, ndc, clipped);
+  global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
   float3 sum = 0.0f;
   CutChannels of_cuts = {0.0f, 0.0f};
-  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
-    const uint face = corners[k] / 3, corner = corners[k] % 3;
+  for (uint k = run[0]; k < run[1]; ++k) {
+    const uint face = corners[k] / 3 - first_row(p, view), corner = corners[k] % 3;
     if (s.clipped[face].corners == 0) continue;
     const ClippedFace of = s.clipped[face];
     const float4 grad = sum_of_pairs(first_edge + p.mesh_edges + face, pair_starts, edge_pairs, grad_ends);
@@ -382,8 +386,7 @@ kernel void contour_gather_cuts(const FrameParams p, global const ViewParams* re
       if (to_kept && views[view].distorts) add_cut_channels(p, views + view, of, cut, at_cut, &of_cuts);
     }
   }
-  const uint last = 2 * corner_starts[vertex + 1];
-  for (uint k = 2 * corner_starts[vertex]; k < last; ++k) {
+  for (uint k = 2 * run[0]; k < 2 * run[1]; ++k) {
     const uint own_end = k % 2, edge = edge_at(face_edges, corners[k / 2], own_end);
     if (edge == DPR_NO_MESH_EDGE) continue;
     const ViewEdge e = view_edge(s, edge);

@@ -4,6 +4,7 @@
 #define DPR_CONTOUR_H
 
 #include "clip.h"
+#include "face_rows.h"
 #include "geometry.h"
 
 /// Role of an edge in a view. A contour occludes the surface behind it; a crease has surface on both sides.
@@ -74,7 +75,7 @@ static inline uint corner_of_vertex(uint4 face, uint vertex) {
 /// Inputs from which the edges of a view are read.
 typedef struct {
   global const uint2* edges;
-  global const uint4* faces;
+  global const uint4* faces;          // of the view
   global const float4* ndc;           // [vertex] of the view
   global const ClippedFace* clipped;  // [face] of the view; not read where no face is clipped
   uint mesh_edges, clips;
@@ -88,8 +89,12 @@ static inline global const uint2* edges_of_shape(const FrameParams p, uint view,
 static inline EdgeScene edges_of_view(const FrameParams p, uint view, global const uint2* edges,
                                       global const uint4* faces, global const float4* ndc,
                                       global const ClippedFace* clipped) {
-  const EdgeScene s = {edges_of_shape(p, view, edges),           faces,        ndc + view * p.vertices,
-                       clipped + (p.clips ? view * p.faces : 0), p.mesh_edges, p.clips};
+  const EdgeScene s = {edges_of_shape(p, view, edges),
+                       faces + first_row(p, view),
+                       ndc + view * p.vertices,
+                       clipped + (p.clips ? view * p.faces : 0),
+                       p.mesh_edges,
+                       p.clips};
   return s;
 }
 

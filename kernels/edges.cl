@@ -39,8 +39,13 @@ static inline uint bucket_of(const PlacedEdge e, uint buckets) {
   return (hash_of_place(e.first) + hash_of_place(e.second) + e.mesh) & (buckets - 1);
 }
 
+/// The first open edge of a copy: its faces may be its own.
+static inline uint open_of_copy(const FrameParams p, uint4 sizes, uint copy) {
+  return p.own_faces ? copy * sizes.y : 0;
+}
+
 /// Lists open edges by the hash of their place. One work-item per (copy, open edge).
-/// in      open       OpenEdge[open]
+/// in      open       OpenEdge[open] or, of views' own faces, OpenEdge[copy][open], the last of them DPR_NO_SIDE
 /// in      sizes      copies, 1 or the views that have shapes of their own; open edges and buckets of each
 /// in      faces      uint4[face]          vertex indices; w = mesh
 /// in      places     MeshPlace[mesh]
@@ -54,7 +59,10 @@ kernel void edges_list(const FrameParams p, const uint4 sizes, global const Open
   const uint i = (uint)get_global_id(0);
   if (i >= sizes.x * sizes.y) return;
   const uint copy = i / sizes.y, own = i - copy * sizes.y;
-  const PlacedEdge e = placed_edge(open[own].side, faces, places, positions + copy * p.position_stride);
+  const uint side = open[open_of_copy(p, sizes, copy) + own].side;
+  if (side == DPR_NO_SIDE) return;
+  const PlacedEdge e =
+      placed_edge(side, faces + first_row(p, copy), places, positions + copy * p.position_stride);
   if (e.has_area) next[i] = atomic_xchg(heads + copy * sizes.z + bucket_of(e, sizes.z), own);
 }
 
@@ -80,14 +88,17 @@ kernel void edges_join(const FrameParams p, const uint4 sizes, const uint mesh_e
   const uint i = (uint)get_global_id(0);
   if (i >= sizes.x * sizes.y) return;
   const uint copy = i / sizes.y, own = i - copy * sizes.y;
+  open += open_of_copy(p, sizes, copy);
+  if (open[own].side == DPR_NO_SIDE) return;
   global const float4* of_copy = positions + copy * p.position_stride;
-  const PlacedEdge e = placed_edge(open[own].side, faces, places, of_copy);
+  global const uint4* const its_faces = faces + first_row(p, copy);
+  const PlacedEdge e = placed_edge(open[own].side, its_faces, places, of_copy);
   uint other = own, met = 0;
   int same_direction = 0;
   if (e.has_area) {
     for (uint k = heads[copy * sizes.z + bucket_of(e, sizes.z)]; k != DPR_NO_OPEN_EDGE && met < 2;
          k = next[copy * sizes.y + k]) {
-      const PlacedEdge o = placed_edge(open[k].side, faces, places, of_copy);
+      const PlacedEdge o = placed_edge(open[k].side, its_faces, places, of_copy);
       const int along = is_same(e.first, o.first) && is_same(e.second, o.second);
       const int against = is_same(e.first, o.second) && is_same(e.second, o.first);
       if (k == own || o.mesh != e.mesh || !(along || against)) continue;
@@ -102,5 +113,5 @@ kernel void edges_join(const FrameParams p, const uint4 sizes, const uint mesh_e
     if (texture_jumps(open[own], open[other], same_direction)) row.x |= DPR_EDGE_SEAM;
     if (open[own].material != open[other].material) row.y |= DPR_EDGE_SEAM;
   }
-  edges[copy * mesh_edges + edge_at(face_edges, open[own].side, 0)] = row;
+  edges[copy * mesh_edges + edge_at(face_edges, 3 * first_row(p, copy) + open[own].side, 0)] = row;
 }

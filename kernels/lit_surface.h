@@ -5,6 +5,7 @@
 
 #include "tile_lanes.h"
 
+#include "face_rows.h"
 #include "lighting.h"
 
 #ifndef DPR_BASE
@@ -30,7 +31,7 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
                                    global const float4* restrict colors, global const float4* restrict world,
                                    global const float4* restrict materials) {
   const uint view = view_face / p.faces;
-  faces += view_face % p.faces;
+  faces += row_of_face(p, view_face);
   const uint4 f = faces[0], c = faces[p.color_faces], n = faces[p.normal_faces];
   const uint vertex[3] = {f.x, f.y, f.z}, color[3] = {c.x, c.y, c.z}, normal[3] = {n.x, n.y, n.z};
   global const float4 *corner = world + view * p.vertices,

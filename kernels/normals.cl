@@ -1,6 +1,7 @@
 // Normals in world space: of vertices, the faces' area-weighted normals, summed in order and normalised;
 // those that meshes give, turned with the mesh; and back. A view has those of all vertices, then those given.
 #include "face_normal.h"
+#include "face_rows.h"
 #include "world_tangents.h"
 
 /// Normal sums shorter than this have no direction, squared world units; nor have those that overflow.
@@ -20,9 +21,9 @@ static inline uint normal_at(const FrameParams p, uint view, uint normal) {
 }
 
 /// One work-item per (view, vertex).
-/// in   faces          uint4[face]           vertex indices
-/// in   corner_starts  uint[vertex + 1]      runs of `corners`
-/// in   corners        uint[corner]          the faces around a vertex, as face * 3 + corner
+/// in   faces          uint4[row]            vertex indices
+/// in   corner_starts  uint[vertex + 1]      runs of `corners`; of views' own faces by [view][vertex]
+/// in   corners        uint[corner]          the faces around a vertex, as row * 3 + corner
 /// in   world          float4[view][vertex]  world space
 /// out  world          float4[view][normal]  behind the vertices, those of vertices: unit, or zero; w = 1 / length
 ///      of the sum, or zero
@@ -32,8 +33,9 @@ kernel void normals_forward(const FrameParams p, global const uint4* restrict fa
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.vertices) return;
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
+  global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
   float3 sum = (float3)(0.0f);
-  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
+  for (uint k = run[0]; k < run[1]; ++k) {
     sum += face_normal(world + view * p.vertices, faces[corners[k] / 3]);
   }
   world[normal_at(p, view, vertex)] = unit_normal(sum);
@@ -100,8 +102,9 @@ kernel void normals_backward(const FrameParams p, global const uint4* restrict f
   const uint view = i / p.vertices, vertex = i - view * p.vertices;
   global const float4* positions = world + view * p.vertices;
   global const float4* sums = grad_sums + view * p.normals;
+  global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
   float3 sum = (float3)(0.0f);
-  for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k) {
+  for (uint k = run[0]; k < run[1]; ++k) {
     const uint4 face = faces[corners[k] / 3];
     const uint corner = corners[k] % 3;
     const uint next = corner == 0 ? face.y : corner == 1 ? face.z : face.x;
@@ -174,8 +177,9 @@ kernel void normals_tangent(const FrameParams p, const TangentParams q, global c
       moved[normal_at(p, view, vertex)] = (float4)(cross(turn.xyz, n.xyz), 0.0f);
       continue;
     }
+    global const uint* const run = starts_of_view(p, view, p.vertices, corner_starts) + vertex;
     float3 sum = 0.0f;
-    for (uint k = corner_starts[vertex]; k < corner_starts[vertex + 1]; ++k)
+    for (uint k = run[0]; k < run[1]; ++k)
       sum += face_normal_tangent(positions, moved + view * p.vertices, faces[corners[k] / 3]);
     moved[normal_at(p, view, vertex)] = (float4)((sum - n.xyz * dot(n.xyz, sum)) * n.w, 0.0f);
   }

@@ -1,5 +1,6 @@
 // Opacity of surfaces: a triangle covers a pixel with its opacity times its perturbed occupancy, as if chance
 // decided whether it is there.
+#include "face_rows.h"
 #include "shared_types.h"
 #include "tile_lanes.h"
 
@@ -11,7 +12,7 @@ typedef struct {
 static inline CornerOpacities load_opacities(const FrameParams p, uint view_face,
                                              global const uint4* restrict faces,
                                              global const float4* restrict opacities) {
-  const uint4 corners = faces[p.opacity_faces + view_face % p.faces];
+  const uint4 corners = faces[p.opacity_faces + row_of_face(p, view_face)];
   CornerOpacities o;
   o.base = opacities[corners.x].x;
   o.along1 = opacities[corners.y].x - o.base;

@@ -1,6 +1,7 @@
 // Triangles to fragments. A pair's coverage of its tile is a 64-bit mask; fragments are listed by pair (so
 // that a triangle's fragments lie together: uniform triangle data, gathers without atomics), and every pixel
 // has the list of its own.
+#include "face_rows.h"
 #include "rasterize.h"
 #include "window.h"
 
@@ -308,8 +309,7 @@ kernel void rasterize_backward(const FrameParams p, const uint last_pair, global
 /// in   fragments  float[plane][fragment]  DISTANCE, whose sign says on which side the sample lies, and BARY
 /// out  tangents  float[direction][q.planes][fragment]  of DEPTH, BARY; of DISTANCE in place of LOG_OCCUPANCY
 kernel void rasterize_tangent(const FrameParams p, const uint2 range, const TangentParams q,
-                              global const uint* restrict pairs,
-                              global const Triangle* restrict triangles,
+                              global const uint* restrict pairs, global const Triangle* restrict triangles,
                               global const uint* restrict pair_face,
                               global const uint* restrict fragment_starts, global const uint* restrict pixels,
                               global const uint4* restrict faces, global const float4* restrict vertices,
@@ -321,7 +321,7 @@ kernel void rasterize_tangent(const FrameParams p, const uint2 range, const Tang
     const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
     if (first == last) continue;
     const uint view_face = pair_face[pair], view = view_face / p.faces;
-    const uint4 face = faces[view_face - view * p.faces];
+    const uint4 face = faces[first_row(p, view) + view_face - view * p.faces];
     const Triangle t = triangles[view_face];
     const BarycentricScale scale = barycentric_scale(t, p.perspective_correct);
     for (uint i = first; i < last; i += DPR_WIDTH) {

@@ -1,4 +1,5 @@
 // Triangles of a view: assembled from projected vertices, culled, bounded, and the tiles of each counted.
+#include "face_rows.h"
 #include "group.h"
 #include "setup.h"
 
@@ -25,7 +26,7 @@ typedef struct {
 static inline Corners corners_of(const FrameParams p, uint i, global const uint4* restrict faces,
                                  global const float4* restrict ndc) {
   const uint view = i / p.faces;
-  const uint4 face = faces[i - view * p.faces];
+  const uint4 face = faces[first_row(p, view) + i - view * p.faces];
   global const float4* vertices = ndc + view * p.vertices;
   const Corners corners = {vertices[face.x].xyz, vertices[face.y].xyz, vertices[face.z].xyz, view, face.w};
   return corners;

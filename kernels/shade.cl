@@ -1,4 +1,5 @@
 // Fragment colours without lights: the corners' colours, interpolated. A face colour is three equal corners.
+#include "face_rows.h"
 #include "shared_types.h"
 #include "tile_lanes.h"
 
@@ -11,7 +12,7 @@ static inline CornerColors load_colors(const FrameParams p, uint view_face,
                                        global const uint4* restrict faces,
                                        global const float4* restrict colors) {
   const uint view = view_face / p.faces;
-  const uint4 corners = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const uint4 corners = faces[p.color_faces + row_of_face(p, view_face)] + view * p.color_stride;
   CornerColors c;
   c.base = colors[corners.x];
   c.along1 = colors[corners.y] - c.base;
@@ -99,10 +100,9 @@ kernel void shade_backward(const FrameParams p, const uint2 range, global const 
 /// in   color_tangents  float4[direction][color] or, with a stride, float4[direction][view][color]
 /// in out  tangents     float[direction][q.planes][fragment]  COLOR by BARY
 kernel void shade_tangent(const FrameParams p, const uint2 range, const TangentParams q,
-                          global const uint* restrict pairs,
-                          global const uint* restrict pair_face, global const uint* restrict fragment_starts,
-                          global const uint4* restrict faces, global const float4* restrict colors,
-                          global const float4* restrict color_tangents,
+                          global const uint* restrict pairs, global const uint* restrict pair_face,
+                          global const uint* restrict fragment_starts, global const uint4* restrict faces,
+                          global const float4* restrict colors, global const float4* restrict color_tangents,
                           global const float* restrict fragments, global float* restrict tangents) {
   const uint2 group = pair_group(range, pairs[0]);
   if (group.x >= group.y) return;
@@ -113,8 +113,7 @@ kernel void shade_tangent(const FrameParams p, const uint2 range, const TangentP
     const CornerColors c = load_colors(p, pair_face[pair], faces, colors);
     for (uint d = 0; d < q.directions; ++d) {
       CornerColors m = {0.0f, 0.0f, 0.0f};
-      if (q.colors != 0)
-        m = load_colors(p, pair_face[pair], faces, color_tangents + (size_t)d * q.colors);
+      if (q.colors != 0) m = load_colors(p, pair_face[pair], faces, color_tangents + (size_t)d * q.colors);
       global float* const of = tangents + (size_t)d * q.planes * p.grad_fragments;
       for (uint i = first; i < last; i += DPR_WIDTH) {
         const intn in_run = lanes_before(last, i);

@@ -121,7 +121,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp,
 #pragma unroll
   for (int k = 0; k < 3; ++k) position[k] = sum_vec3n(g.position[k]);
   if (DPR_SHADING == DPR_FLAT) {
-    const uint4 f = faces[pair_face[pair] % p.faces];
+    const uint4 f = faces[row_of_face(p, pair_face[pair])];
     global const float4* view_world = world + pair_face[pair] / p.faces * p.vertices;
     const float4 corners[3] = {view_world[f.x], view_world[f.y], view_world[f.z]};
     flat_normal_backward(corners, sum_vec3n(g.normal[0]) + sum_vec3n(g.normal[1]) + sum_vec3n(g.normal[2]),

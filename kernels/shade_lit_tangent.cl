@@ -98,7 +98,7 @@ static inline PlaceTangent load_place_tangent(const FrameParams p, uint directio
                                               global const uint4* faces, global const float4* world,
                                               global const float4* world_tangents) {
   const uint view = view_face / p.faces;
-  faces += view_face - view * p.faces;
+  faces += row_of_face(p, view_face);
   const uint4 f = faces[0], n = faces[p.normal_faces];
   const uint vertex[3] = {f.x, f.y, f.z}, normal[3] = {n.x, n.y, n.z};
   world_tangents += world_tangents_at(p, direction);

@@ -171,8 +171,9 @@
 #define DPR_EDGE_FLAG 0x80000000u
 #define DPR_EDGE_SEAM 0x40000000u
 
-/// In place of an open edge where a list of them ends.
+/// In place of an open edge where a list of them ends; and of its side where a view has fewer than others.
 #define DPR_NO_OPEN_EDGE 0xffffffffu
+#define DPR_NO_SIDE 0xffffffffu
 
 /// Edges are numbered in the order of their sides. Every face has the number of its first edge times
 /// DPR_FACE_SIDES, and bit k set where side k is an edge's; DPR_NO_MESH_EDGE in place of the number of one.

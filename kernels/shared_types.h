@@ -19,6 +19,7 @@ typedef struct FrameParams {
   uint views, meshes, vertices, faces;
   uint position_stride;  /* from one view's positions to the next where views have shapes, else 0 */
   uint color_stride;     /* the same for colours */
+  uint own_faces;        /* every view has faces of its own: face_rows.h. Then positions have a stride too */
   uint first_view;       /* of a larger batch, which names the noise; 0 otherwise */
   uint width, height;    /* pixels */
   uint tiles_x, tiles_y; /* tiles of one view */
@@ -38,8 +39,9 @@ typedef struct FrameParams {
   uint has_base;                  /* fragments have base colours: the light falls on textures */
   uint fragments, grad_fragments; /* from one of their planes to the next */
   uint pairs, last_pair;          /* of the frame, or their capacity; where the band's end */
-  uint mesh_edges, edges;         /* of the scene; of a view: cuts of clipped faces are edges too */
-  uint shading;                   /* DPR_UNLIT, DPR_FLAT, ...: whose creases are contours */
+  uint mesh_edges,
+      edges;    /* of the scene, or of a view's own faces; of a view: cuts of clipped faces are edges too */
+  uint shading; /* DPR_UNLIT, DPR_FLAT, ...: whose creases are contours */
   float depth_reach; /* normalised depth: surfaces that much behind the nearest may still be seen */
   /* The window of samples that buffers hold (window.h): where it begins, how many of the frame's are not in
      it, and its first tile. All 0: the whole frame. */

@@ -148,7 +148,7 @@ kernel void surface_detail_backward(const FrameParams p, global const uint* rest
                                     global float* restrict grad_corners, global float* restrict grad_clip) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(p.last_pair, pairs[0])) return;
-  const uint view_face = pair_face[pair], texture = faces[p.texcoord_faces + view_face % p.faces].w;
+  const uint view_face = pair_face[pair], texture = faces[p.texcoord_faces + row_of_face(p, view_face)].w;
   global const float* const grad_steps = grad_pairs + DPR_PAIR_STEPS * (size_t)p.pairs + 9 * pair;
   if (texture == DPR_NO_TEXTURE || textures[texture].levels == 1) return;
   const float3 depth = vload3(2, grad_steps);
@@ -227,7 +227,7 @@ kernel void surface_tangent(const FrameParams p, const TangentParams q, global c
   if (first == last) return;
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const uint view_face = pair_face[pair], view = view_face / p.faces;
-  const uint4 color = faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const uint4 color = faces[p.color_faces + row_of_face(p, view_face)] + view * p.color_stride;
   const TexturedFace face = load_face(scene, p, view_face);
   for (uint i = first; i < last; ++i) {
     const float c1 = fragments[i + DPR_PLANE(p, BARY)], c2 = fragments[i + DPR_PLANE(p, BARY) + p.fragments];
@@ -289,7 +289,7 @@ kernel void surface_detail_tangent(
   if (pair >= p.last_pair) return;
   const SurfaceScene scene = {faces, colors, texcoords, textures, triangles, clipped};
   const uint view_face = pair_face[pair], view = view_face / p.faces, last = fragment_starts[pair + 1];
-  const uint4 corner = faces[view_face - view * p.faces];
+  const uint4 corner = faces[row_of_face(p, view_face)];
   const TexturedFace face = load_face(scene, p, view_face);
   if (face.texture.levels == 1) return;
   global const float4* const vertices_of = face.is_clipped ? clip_vertices : vertices;

@@ -5,6 +5,7 @@
 #define DPR_TEXTURE_H
 
 #include "clip.h"
+#include "face_rows.h"
 #include "geometry.h"
 #include "pyramid.h"
 
@@ -73,7 +74,7 @@ static inline float2 place_of(float4 texcoord) { return (float2)(texcoord.x, 1.0
 
 /// Without the colours.
 static inline TexturedFace load_place(const SurfaceScene s, const FrameParams p, uint view_face) {
-  const uint4 corner = s.faces[p.texcoord_faces + view_face % p.faces];
+  const uint4 corner = s.faces[p.texcoord_faces + row_of_face(p, view_face)];
   TexturedFace f;
   f.is_textured = corner.w != DPR_NO_TEXTURE;
   f.texture = s.textures[f.is_textured ? corner.w : 0];
@@ -93,7 +94,7 @@ static inline TexturedFace load_place(const SurfaceScene s, const FrameParams p,
 
 static inline TexturedFace load_face(const SurfaceScene s, const FrameParams p, uint view_face) {
   const uint view = view_face / p.faces;
-  const uint4 c = s.faces[p.color_faces + view_face - view * p.faces] + view * p.color_stride;
+  const uint4 c = s.faces[p.color_faces + row_of_face(p, view_face)] + view * p.color_stride;
   TexturedFace f = load_place(s, p, view_face);
   f.color = s.colors[c.x];
   f.color1 = s.colors[c.y] - f.color;

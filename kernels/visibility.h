@@ -81,7 +81,7 @@ static inline float plane_depth(const FrameParams p, const TileContour c, float3
 static inline int hides_crease(const FrameParams p, const TileContour c, global const uint4* restrict faces,
                                global const float4* restrict ndc, int own, float2 sample, float front,
                                float depth, float slack) {
-  const uint4 face = faces[own ? own_face(c.record) : other_face(c.record)];
+  const uint4 face = faces[first_row(p, c.view) + (own ? own_face(c.record) : other_face(c.record))];
   const float3 across = corner_across(face, c.record, ndc + c.view * p.vertices);
   const float expected = plane_depth(p, c, across, sample, depth);
   return front < expected - slack - DPR_CREASE_SLACK * fabs(expected - depth);

@@ -44,12 +44,6 @@ bool is_name(const std::string& name, std::size_t textures) {
   return i < textures;
 }
 
-std::size_t count_textures(NamedArrays arrays) {
-  std::size_t count = 0;
-  while (find(arrays, texture_name(count))) ++count;
-  return count;
-}
-
 // Numbers of a view's projection: the height of an orthographic one, the intrinsics, or these and the
 // coefficients of the lens.
 constexpr std::size_t k_orthographic = 1, k_pinhole = 4, k_fisheye = 8, k_brown = 9;
@@ -64,92 +58,6 @@ void set_projection(Camera& camera, std::span<const float> k) {
   if (k.size() == k_fisheye) camera.distortion = fisheye(k[4], k[5], k[6], k[7]);
 }
 
-int texture_side(std::size_t texels, const NamedArray& texture) {
-  if (texels >= 1 && texels <= checks::k_largest_side) return static_cast<int>(texels);
-  throw InvalidArgument(argument(texture), std::to_string(texels),
-                        "1 to " + std::to_string(checks::k_largest_side) + " texels a side");
-}
-
-/// A texture's mode, of a list of one for each texture, one for all, or none.
-template <typename Mode>
-Mode mode_of(const std::vector<Mode>& modes, std::size_t texture, std::size_t textures, const char* name,
-             Mode otherwise) {
-  if (modes.empty()) return otherwise;
-  if (modes.size() != 1 && modes.size() != textures) {
-    throw InvalidArgument(std::string(name) + " (batch)", std::to_string(modes.size()) + " words",
-                          "one, or one for each texture: " + std::to_string(textures));
-  }
-  return modes[modes.size() == 1 ? 0 : texture];
-}
-
-std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings& settings) {
-  const std::size_t count = count_textures(arrays);
-  const TextureForm usual;
-  std::vector<TextureForm> forms;
-  for (std::size_t i = 0; i < count; ++i) {
-    const NamedArray& texture = require(arrays, texture_name(i));
-    require_form(texture, Element::float32,
-                 {{k_any, k_any, 3}, {1, k_any, k_any, 3}, {k_any, k_any, 4}, {1, k_any, k_any, 4}},
-                 "[H, W, 3] or [H, W, 4], or with N in front of each view by itself");
-    const std::size_t rows = texture.shape.size() - 3;
-    forms.push_back({texture_side(texture.shape[rows + 1], texture),
-                     texture_side(texture.shape[rows], texture),
-                     mode_of(settings.wraps(), i, count, "wrap", usual.wrap),
-                     mode_of(settings.filters(), i, count, "filter", usual.filter), has_alpha(texture)});
-  }
-  return forms;
-}
-
-/// The number of opacities of that name; 0 without.
-std::size_t count_opacities(NamedArrays arrays, std::string_view name, std::size_t count) {
-  const NamedArray* const opacities = find(arrays, name);
-  if (!opacities) return 0;
-  require_floats(*opacities, {count}, "[" + std::to_string(count) + "]");
-  return count;
-}
-
-/// Texture coordinates and what refers to them: of vertices, of corners, or by indices.
-void take_texcoords(NamedArrays arrays, const NamedArray& faces, std::size_t vertices, Surface& surface) {
-  const NamedArray* const texcoords = find(arrays, "texcoords");
-  const NamedArray* const indices = find(arrays, "face_texcoords");
-  if (!texcoords) {
-    if (indices) throw InvalidArgument(argument(*indices), "them alone", "them beside texcoords");
-    return;
-  }
-  surface.texcoords = texcoords->count() / 2;
-  if (indices) {
-    require_floats(*texcoords, {k_any, 2}, "[T, 2], beside face_texcoords");
-    surface.face_texcoords = read_triples(*indices);
-    return;
-  }
-  const std::size_t count = faces.shape[0];
-  const std::string of_faces = std::to_string(count);
-  require_form(*texcoords, Element::float32, {{vertices, 2}, {count, 3, 2}},
-               "[" + std::to_string(vertices) + ", 2] or [" + of_faces + ", 3, 2], or face_texcoords beside");
-  if (texcoords->shape.size() == 2) {
-    surface.face_texcoords = read_triples(faces);
-    return;
-  }
-  for (std::uint32_t i = 0; i < 3 * count; i += 3) surface.face_texcoords.emplace_back(i, i + 1, i + 2);
-}
-
-std::size_t count_materials(NamedArrays arrays) {
-  const NamedArray* const specular = find(arrays, "materials.specular");
-  const NamedArray* const shininess = find(arrays, "materials.shininess");
-  if (specular) require_floats(*specular, {k_any, 3}, "[M, 3]");
-  if (!shininess) return specular ? specular->shape[0] : 0;
-  require_floats(*shininess, {k_any}, "[M]");
-  const std::size_t count = specular ? specular->shape[0] : shininess->shape[0];
-  require_floats(*shininess, {count}, "[" + std::to_string(count) + "], one for each specular");
-  return count;
-}
-
-std::vector<std::uint32_t> read_of_faces(NamedArrays arrays, std::string_view name, std::size_t faces,
-                                         std::int64_t least) {
-  const NamedArray* const indices = find(arrays, name);
-  return indices ? read_indices(*indices, faces, least) : std::vector<std::uint32_t>();
-}
-
 /// [view][n][3] or [n][3]: as many as `views`, or one.
 void require_batch(const NamedArray& array, std::size_t views, std::size_t count, const std::string& letter) {
   require_form(array, Element::float32, {{count, 3}, {k_any, count, 3}},
@@ -159,9 +67,36 @@ void require_batch(const NamedArray& array, std::size_t views, std::size_t count
                         "1 or " + std::to_string(views) + ", one a view, in the first dimension");
 }
 
+/// Throws InvalidArgument unless arrays go with faces of every one of `views` views by itself.
+void require_own_arrays(NamedArrays arrays, std::size_t views) {
+  for (const NamedArray& array : arrays) {
+    if (array.name == "opacities" || array.name == "face_opacities" ||
+        (array.name.starts_with(k_texture) && has_alpha(array)))
+      throw InvalidArgument(argument(array), "opacities beside faces of every view by itself",
+                            "meshes that are opaque, or one after the other");
+    static constexpr std::array<std::string_view, 4> k_by_view{"faces", "vertices", "colors", "face_colors"};
+    if (std::ranges::find(k_by_view, array.name) == k_by_view.end()) continue;
+    if (array.shape.size() != 3 || array.shape[0] != views)
+      throw InvalidArgument(argument(array), text_of(array.shape),
+                            "[" + std::to_string(views) + ", ...], as faces are of every view by itself");
+  }
+}
+
 }  // namespace
 
 std::string texture_name(std::size_t index) { return checks::element("textures", index); }
+
+std::size_t count_textures(NamedArrays arrays) {
+  std::size_t count = 0;
+  while (find(arrays, texture_name(count))) ++count;
+  return count;
+}
+
+FaceSizes sizes_of(const NamedArray& faces) {
+  const std::vector<std::size_t>& shape = faces.shape;
+  if (shape.size() < 2) return {1, shape.empty() ? 0 : shape[0]};
+  return {shape.size() > 2 ? std::max<std::size_t>(shape[0], 1) : 1, shape[shape.size() - 2]};
+}
 
 std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
   using Path = std::pair<std::string_view, std::string_view>;  // an array's name, what paths begin with
@@ -197,19 +132,6 @@ std::vector<const GradientRow*> gradient_rows_of(std::string_view name) {
 }
 
 bool has_alpha(const NamedArray& texture) { return texture.shape.back() == 4; }
-
-void take_texture(const NamedArray& from, std::vector<glm::vec3>& texels, std::vector<float>& opacities) {
-  texels.clear();
-  opacities.clear();
-  if (!has_alpha(from)) {
-    const auto rows = from.rows<const glm::vec3>();
-    return texels.assign(rows.begin(), rows.end());
-  }
-  for (const glm::vec4& texel : from.rows<const glm::vec4>()) {
-    texels.emplace_back(texel);
-    opacities.push_back(texel.a);
-  }
-}
 
 const NamedArray* find_colors(NamedArrays arrays) {
   const NamedArray* const colors = find(arrays, "colors");
@@ -251,12 +173,11 @@ BatchSizes check_sizes(NamedArrays arrays) {
     throw InvalidArgument("colors (batch)", "colors and face_colors", "one of them");
   if (const NamedArray* const colors = find(arrays, "colors"))
     require_batch(*colors, count, of_mesh, std::to_string(of_mesh));
-  const NamedArray& faces = require(arrays, "faces");
-  if (const NamedArray* const colors = find(arrays, "face_colors")) {
-    const std::size_t of_faces = faces.shape.empty() ? k_any : faces.shape[0];
-    require_batch(*colors, count, of_faces, std::to_string(of_faces));
-  }
-  return {count, of_mesh};
+  const FaceSizes faces = sizes_of(require(arrays, "faces"));
+  if (const NamedArray* const colors = find(arrays, "face_colors"))
+    require_batch(*colors, count, faces.count, std::to_string(faces.count));
+  if (faces.views > 1) require_own_arrays(arrays, count);
+  return {count, of_mesh, faces.views};
 }
 
 std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings) {
@@ -316,32 +237,13 @@ std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& option
   return lights;
 }
 
-Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::size_t vertices) {
-  const NamedArray& faces = require(arrays, "faces");
-  require_triples(faces);
-  Surface surface;
-  surface.textures = texture_forms(arrays, settings);
-  take_texcoords(arrays, faces, vertices, surface);
-  const bool has_textures = !surface.textures.empty();
-  if (has_textures == (surface.texcoords == 0)) {
-    throw InvalidArgument(has_textures ? "texcoords (batch)" : "textures (batch)",
-                          has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
-  }
-  surface.materials = count_materials(arrays);
-  surface.vertex_opacities = count_opacities(arrays, "opacities", vertices);
-  surface.face_opacities = count_opacities(arrays, "face_opacities", faces.shape[0]);
-  if (surface.vertex_opacities > 0 && surface.face_opacities > 0)
-    throw InvalidArgument("opacities (batch)", "opacities and face_opacities", "one of them");
-  surface.face_textures = read_of_faces(arrays, "face_textures", faces.shape[0], -1);
-  surface.face_materials = read_of_faces(arrays, "face_materials", faces.shape[0], 0);
-  return surface;
-}
-
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
   const BatchSizes sizes = check_sizes(arrays);
   Surface surface = make_surface(arrays, settings, sizes.vertices);
-  return {require(arrays, "faces"), sizes.vertices,    find(arrays, "face_colors") != nullptr,
-          settings.width(),         settings.height(), std::move(surface)};
+  return {require(arrays, "faces"), sizes.views_of_faces,
+          sizes.vertices,           find(arrays, "face_colors") != nullptr,
+          settings.width(),         settings.height(),
+          std::move(surface)};
 }
 
 RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {
@@ -353,35 +255,6 @@ RenderSettings with_numbers(RenderSettings settings, NamedArrays arrays) {
   }
   settings.require_parts();
   return settings;
-}
-
-void upload_surface(Renderer& renderer, NamedArrays arrays) {
-  const Mesh& mesh = renderer.scene().meshes[0].mesh;
-  if (!mesh.texcoords.empty())
-    renderer.set_texcoords(0, require(arrays, "texcoords").rows<const glm::vec2>());
-  std::vector<glm::vec3> texels;
-  std::vector<float> texel_opacities;
-  for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
-    const NamedArray& texture = require(arrays, texture_name(i));
-    if (!has_alpha(texture)) {  // millions, perhaps: not copied
-      renderer.set_texels(0, i, texture.rows<const glm::vec3>());
-      continue;
-    }
-    take_texture(texture, texels, texel_opacities);
-    renderer.set_texels(0, i, texels);
-    renderer.set_texel_opacities(0, i, texel_opacities);
-  }
-  if (const NamedArray* const opacities = find_opacities(arrays))
-    renderer.set_opacities(0, opacities->rows<const float>());
-  if (mesh.materials.empty()) return;
-  std::vector<Material> materials(mesh.materials.size());
-  const NamedArray* const specular = find(arrays, "materials.specular");
-  const NamedArray* const shininess = find(arrays, "materials.shininess");
-  for (std::size_t i = 0; i < materials.size(); ++i) {
-    if (specular) materials[i].specular = specular->rows<const glm::vec3>()[i];
-    if (shininess) materials[i].shininess = shininess->rows<const float>()[i];
-  }
-  renderer.set_materials(0, materials);
 }
 
 }  // namespace dpr::batch

@@ -13,9 +13,10 @@
 
 namespace dpr::batch {
 
-/// The names that arrays may have, and no other; and the counts of views and vertices.
+/// The names that arrays may have, and no other; and the counts of views, of a view's vertices, and of the views that
+/// have faces of their own: all, or 1 where they share them.
 struct BatchSizes {
-  std::size_t views, vertices;
+  std::size_t views, vertices, views_of_faces;
 };
 BatchSizes check_sizes(NamedArrays arrays);
 
@@ -34,6 +35,12 @@ const NamedArray* find_colors(NamedArrays arrays);
 const NamedArray* find_opacities(NamedArrays arrays);
 /// "textures[2]"
 std::string texture_name(std::size_t index);
+std::size_t count_textures(NamedArrays arrays);
+/// How many views have faces of their own, or 1, and how many faces each has.
+struct FaceSizes {
+  std::size_t views, count;
+};
+FaceSizes sizes_of(const NamedArray& faces);
 /// True if the fourth channel is there, which is opacity.
 bool has_alpha(const NamedArray& texture);
 void take_texture(const NamedArray& from, std::vector<glm::vec3>& texels, std::vector<float>& opacities);

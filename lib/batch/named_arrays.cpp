@@ -42,10 +42,11 @@ std::uint32_t to_index(const NamedArray& array, std::int64_t index, std::int64_t
   return static_cast<std::uint32_t>(index);
 }
 
-void require_indices(const NamedArray& array, Shape shape, const std::string& expected) {
+void require_indices(const NamedArray& array, std::initializer_list<Shape> shapes,
+                     const std::string& expected) {
   if (array.element == Element::float32)
     throw InvalidArgument(argument(array), "float32", "int64 or int32, indices");
-  require_form(array, array.element, {shape}, expected);
+  require_form(array, array.element, shapes, expected);
 }
 
 }  // namespace
@@ -85,7 +86,13 @@ void require_floats(const NamedArray& array, Shape shape, const std::string& exp
   require_form(array, Element::float32, {shape}, expected);
 }
 
-void require_triples(const NamedArray& array) { require_indices(array, {k_any, 3}, "[F, 3]"); }
+void require_triples(const NamedArray& array, std::size_t views) {
+  if (views == 1) {
+    require_indices(array, {{k_any, 3}, {1, k_any, 3}}, "[F, 3]");
+  } else {
+    require_indices(array, {{views, k_any, 3}}, "[" + std::to_string(views) + ", F, 3]");
+  }
+}
 
 bool holds(const NamedArray& array, std::span<const glm::uvec3> triples) {
   constexpr std::size_t k_block = 4096;  // compared without a branch
@@ -105,8 +112,8 @@ bool holds(const NamedArray& array, std::span<const glm::uvec3> triples) {
   });
 }
 
-std::vector<glm::uvec3> read_triples(const NamedArray& array) {
-  require_triples(array);
+std::vector<glm::uvec3> read_triples(const NamedArray& array, std::size_t views) {
+  require_triples(array, views);
   std::vector<glm::uvec3> triples(array.count() / 3);
   visit_indices(array, [&](const auto* values) {
     for (glm::uvec3& triple : triples) {
@@ -116,9 +123,15 @@ std::vector<glm::uvec3> read_triples(const NamedArray& array) {
   return triples;
 }
 
-std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t count, std::int64_t least) {
-  require_indices(array, {count}, "[" + std::to_string(count) + "]");
-  std::vector<std::uint32_t> indices(count);
+std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t views, std::size_t count,
+                                        std::int64_t least) {
+  const std::string of_view = std::to_string(count) + "]";
+  if (views == 1) {
+    require_indices(array, {{count}, {1, count}}, "[" + of_view);
+  } else {
+    require_indices(array, {{views, count}}, "[" + std::to_string(views) + ", " + of_view);
+  }
+  std::vector<std::uint32_t> indices(array.count());
   visit_indices(array, [&](const auto* values) {
     for (std::uint32_t& index : indices) index = to_index(array, *values++, least);
   });

@@ -49,13 +49,15 @@ void require_form(const NamedArray& array, Element element, std::initializer_lis
 /// The same for floats of one shape.
 void require_floats(const NamedArray& array, Shape shape, const std::string& expected);
 
-/// Throws InvalidArgument unless these are whole numbers of either type, [F, 3].
-void require_triples(const NamedArray& array);
+/// Throws InvalidArgument unless these are whole numbers of either type, [F, 3], of several views
+/// [views, F, 3].
+void require_triples(const NamedArray& array, std::size_t views = 1);
 /// True if these are those triples. Copies nothing.
 bool holds(const NamedArray& array, std::span<const glm::uvec3> triples);
-/// Whole numbers of either type, [F, 3] from 0, or [count] from `least`; -1 becomes the largest number there
-/// is. Throw InvalidArgument for a smaller one, another type and another shape.
-std::vector<glm::uvec3> read_triples(const NamedArray& array);
-std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t count, std::int64_t least);
+/// Whole numbers of either type, [F, 3] from 0, or [count] from `least`, of several views with their number in front;
+/// -1 becomes the largest number there is. Throw InvalidArgument for a smaller one, another type and another shape.
+std::vector<glm::uvec3> read_triples(const NamedArray& array, std::size_t views = 1);
+std::vector<std::uint32_t> read_indices(const NamedArray& array, std::size_t views, std::size_t count,
+                                        std::int64_t least);
 
 }  // namespace dpr::batch

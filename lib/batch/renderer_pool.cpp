@@ -8,6 +8,7 @@
 
 #include "device/context.hpp"
 #include "dpr/error.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr::batch {
 namespace {
@@ -57,23 +58,27 @@ void add_surface(Mesh& mesh, const Surface& surface) {
   mesh.face_opacities.assign(surface.face_opacities, 1.0F);
 }
 
-bool Topology::is_of(const Scene& scene) const {
+bool Topology::is_of(const Renderer& renderer) const {
+  const Scene& scene = renderer.scene();
   const Mesh& mesh = scene.meshes[0].mesh;
   return scene.width == width && scene.height == height && mesh.positions.size() == vertices &&
+         impl_of(renderer).geometry->views_of_faces == views_of_faces &&
          mesh.vertex_colors.empty() == face_colors && has_surface(mesh, surface) && holds(faces, mesh.faces);
 }
 
-Scene Topology::scene() const {
+void Topology::set(Renderer& renderer) const {
   Scene scene;
   scene.width = width;
   scene.height = height;
   Mesh mesh;
   mesh.positions.resize(vertices);
-  mesh.faces = read_triples(faces);
+  mesh.faces = read_triples(faces, views_of_faces);
   (face_colors ? mesh.face_colors : mesh.vertex_colors).resize(face_colors ? mesh.faces.size() : vertices);
   add_surface(mesh, surface);
   scene.meshes.push_back({std::move(mesh)});
-  return scene;
+  if (views_of_faces == 1) return renderer.set_scene(scene);
+  validate(scene);
+  impl_of(renderer).set_scene(scene, views_of_faces);
 }
 
 Device open_device_of_process(const std::string& selector) {
@@ -93,7 +98,7 @@ PooledRenderer RendererPool::take(const Topology& topology) {
     const std::lock_guard lock(mutex_);
     State& state = *state_;
     const auto found = std::find_if(state.free.rbegin(), state.free.rend(), [&](const PooledRenderer& free) {
-      return topology.is_of(free.renderer.scene());
+      return topology.is_of(free.renderer);
     });
     if (found != state.free.rend()) {
       PooledRenderer renderer = std::move(*found);
@@ -103,7 +108,7 @@ PooledRenderer RendererPool::take(const Topology& topology) {
     }
   }
   PooledRenderer renderer{Renderer(state_->device)};
-  renderer.renderer.set_scene(topology.scene());
+  topology.set(renderer.renderer);
   const std::lock_guard lock(mutex_);
   state_->most_lent = std::max(state_->most_lent, ++state_->lent);
   return renderer;

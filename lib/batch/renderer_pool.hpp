@@ -45,15 +45,16 @@ void add_surface(Mesh& mesh, const Surface& surface);
 /// array of faces is.
 struct Topology {
   NamedArray faces;
-  std::size_t vertices = 0;
+  std::size_t views_of_faces = 1;  ///< see Renderer::Impl::set_scene()
+  std::size_t vertices = 0;        ///< of a view
   bool face_colors = false;
   int width = 0, height = 0;
   Surface surface;
 
-  /// True if a scene that was made by scene() is of this topology. Copies nothing.
-  bool is_of(const Scene& scene) const;
-  /// Numbers are yet to come. Throws InvalidArgument for what is no index.
-  Scene scene() const;
+  /// True if this is the topology of a renderer's scene, which set() has set. Copies nothing.
+  bool is_of(const Renderer& renderer) const;
+  /// Sets a renderer's scene; numbers are yet to come. Throws InvalidArgument for what is no index.
+  void set(Renderer& renderer) const;
 };
 
 /// Opens a device, as dpr::open_device(). OpenCL does not survive fork(): in a process that was forked from

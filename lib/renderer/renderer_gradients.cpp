@@ -257,7 +257,7 @@ void Renderer::Impl::sum_gradients() {
   const GradientRequest& wanted = scene.gradients;
   const std::size_t pixels = std::size_t{frame.views} * frame.width * frame.height;
   const std::size_t vertices = std::size_t{frame.views} * frame.vertices;
-  const std::size_t faces_of_view = frame.faces, faces = frame.views * faces_of_view;
+  const std::size_t faces = std::size_t{frame.views} * frame.faces;
   // Every kept face has a tile, and every tile some face: so many pairs, whatever room there is for them.
   const std::size_t pairs = faces + std::size_t{frame.views} * frame.tiles_x * frame.tiles_y;
   const bool poses = wanted.transform || wanted.camera || wanted.distortion;
@@ -305,8 +305,8 @@ void Renderer::Impl::sum_gradients() {
        {views.size() * geometry->given_normals.count, channels(normals, 3),
         views.size() * scene.meshes.size(), 1, view_normal_starts, shade.normal_channels}},
       {SumOf::materials,
-       {faces_of_view, channels(wants(ArrayId::materials), DPR_MATERIAL_CHANNELS), geometry->materials.count,
-        1, geometry->materials.starts, material_channels}}};
+       {geometry->rows(), channels(wants(ArrayId::materials), DPR_MATERIAL_CHANNELS),
+        geometry->materials.count, 1, geometry->materials.starts, material_channels}}};
   if (pixel_noise) {
     all.push_back({SumOf::contour_cuts,
                    {vertices, channels(cuts, DPR_CUT_CHANNELS), views.size(), scene.meshes.size(),

@@ -85,7 +85,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   explicit Impl(Device device);
 
   /// The setters' arguments are checked already.
-  void set_scene(const Scene& scene);
+  /// `views_of_faces`: above 1, the faces of the scene, of one mesh then, are those of so many views, as many of each,
+  /// one view after the other. All frames have these views, with shapes of their own, and colours where faces have
+  /// none. Such a mesh gives neither normals nor opacities.
+  void set_scene(const Scene& scene, std::size_t views_of_faces = 1);
   void set_views(std::span<const View> views, std::size_t first_view);
   /// All that depends on each other in one step: none need suit what was there of the others.
   void set_views(std::span<const View> views, std::size_t first_view, const Smoothing& smoothing,
@@ -101,9 +104,10 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void take_transforms(const FloatVectors& from);
   void take_view_matrices(const FloatVectors& from);
   /// Prepares a smoothing for images of the scene's size, and so many views.
-  SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views) const;
+  SmoothingSetting prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views,
+                           std::size_t views_of_faces) const;
   SmoothingSetting prepare(const Smoothing& smoothing) const {
-    return prepare(smoothing, scene, views.size());
+    return prepare(smoothing, scene, views.size(), geometry->views_of_faces);
   }
   void set(SmoothingSetting&& prepared) noexcept;
   /// Enqueues the whole frame where it can be expected to fit into the buffers that the last one left; else

@@ -93,6 +93,7 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   p.meshes = static_cast<cl_uint>(scene.meshes.size());
   p.vertices = static_cast<cl_uint>(geometry.vertices);
   p.faces = static_cast<cl_uint>(geometry.faces);
+  p.own_faces = geometry.has_own_faces() ? 1 : 0;
   set_raster(p, scene, raster);
   p.euclidean = scene.smoothing.distance == DistanceMetric::euclidean ? 1 : 0;
   p.blur_distance = blur_distance(scene.smoothing);
@@ -111,10 +112,11 @@ shared::FrameParams frame_params(const Scene& scene, const Geometry& geometry, s
   return p;
 }
 
-void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_view) {
+void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_view,
+                      std::size_t views_of_faces) {
   // The noise of a view is named by its number, in what the counter has left for it.
   constexpr std::size_t k_most_numbered = std::size_t{1} << 30U;
-  if (views > most_views(scene)) {
+  if (views > most_views(scene, {}, views_of_faces)) {
     throw InvalidArgument("views (frame)", std::to_string(views),
                           "fewer, so that pixels and vertices can be counted");
   }
@@ -125,12 +127,12 @@ void check_frame_size(const Scene& scene, std::size_t views, std::size_t first_v
 }
 
 /// Throws InvalidArgument for a raster whose samples cannot be counted, or named by two 16-bit numbers.
-void check_raster(const Scene& scene, std::size_t views, const Raster& raster) {
+void check_raster(const Scene& scene, std::size_t views, const Raster& raster, std::size_t views_of_faces) {
   constexpr std::size_t k_most_on_side = 1U << 15U;
   const std::size_t width = samples_of_side(scene.width, raster),
                     height = samples_of_side(scene.height, raster);
   if (raster.margin == 0 && raster.supersampling == 1) return;  // the frame itself
-  if (std::max(width, height) <= k_most_on_side && views <= most_views(scene, raster)) return;
+  if (std::max(width, height) <= k_most_on_side && views <= most_views(scene, raster, views_of_faces)) return;
   throw InvalidArgument("sigma and supersampling (smoothing)",
                         "a raster of " + std::to_string(width) + "x" + std::to_string(height) + " samples",
                         "smaller ones: at most " + std::to_string(k_most_on_side) +
@@ -154,11 +156,11 @@ std::size_t ViewSet::bytes() const {
          device_views.vertex_starts.capacity_bytes() + view_normal_starts.capacity_bytes();
 }
 
-void Renderer::Impl::set_scene(const Scene& wanted) {
+void Renderer::Impl::set_scene(const Scene& wanted, std::size_t views_of_faces) {
   const View view = own_view(wanted);
-  check_frame_size(wanted, 1, 0);
+  check_frame_size(wanted, 1, 0, views_of_faces);
   Scene new_scene = wanted;
-  Geometry new_geometry(impl_of(device), wanted);
+  Geometry new_geometry(impl_of(device), wanted, views_of_faces);
   ClipPlanes new_clip_planes(wanted.meshes.size());
   if (is_textured(wanted)) {
     shade.make_surface();
@@ -166,7 +168,7 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
   }
   if (new_geometry.textures.has_opacities() && !texel_opacities) texel_opacities.emplace(impl_of(device));
   Shade::Lighting lighting = shade.prepare(wanted.lights, is_textured(wanted));
-  SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1);
+  SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1, views_of_faces);
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
 
   std::swap(scene, new_scene);
@@ -184,18 +186,18 @@ void Renderer::Impl::set_scene(const Scene& wanted) {
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {
-  check_frame_size(scene, new_views.size(), first_view);
-  check_raster(scene, new_views.size(), raster);
+  check_frame_size(scene, new_views.size(), first_view, geometry->views_of_faces);
+  check_raster(scene, new_views.size(), raster, geometry->views_of_faces);
   fill(spare_views_, scene, *geometry, new_views, first_view);
   set(spare_views_);
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view,
                                const Smoothing& smoothing, const std::optional<Lights>& lights) {
-  check_frame_size(scene, new_views.size(), first_view);
+  check_frame_size(scene, new_views.size(), first_view, geometry->views_of_faces);
   std::optional<Lights> new_lights = lights;
   Shade::Lighting lighting = shade.prepare(lights, is_textured(scene));
-  SmoothingSetting new_smoothing = prepare(smoothing, scene, new_views.size());
+  SmoothingSetting new_smoothing = prepare(smoothing, scene, new_views.size(), geometry->views_of_faces);
   fill(spare_views_, scene, *geometry, new_views, first_view);
 
   std::swap(scene.lights, new_lights);
@@ -235,8 +237,8 @@ void Renderer::Impl::set(ViewSet& prepared) noexcept {
   rendered = false;
 }
 
-SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene& of,
-                                         std::size_t its_views) const {
+SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene& of, std::size_t its_views,
+                                         std::size_t views_of_faces) const {
   if (smoothing.noise == Noise::triangle) {
     return {smoothing,
             occupancy.prepare(smoothing),
@@ -249,7 +251,7 @@ SmoothingSetting Renderer::Impl::prepare(const Smoothing& smoothing, const Scene
   }
   BlurKernel kernel = pixel_blur(smoothing, of);
   const Raster around{kernel.supersampling, kernel.margin};
-  check_raster(of, its_views, around);
+  check_raster(of, its_views, around, views_of_faces);
   const std::shared_ptr<PixelNoise> stages =
       pixel_noise ? pixel_noise : std::make_shared<PixelNoise>(impl_of(device));
   std::shared_ptr<BlurSampled> sampled;

@@ -100,11 +100,11 @@ Raster raster_of(const Scene& scene) {
   return {kernel.supersampling, kernel.margin};
 }
 
-std::size_t most_views(const Scene& scene, const Raster& raster) {
+std::size_t most_views(const Scene& scene, const Raster& raster, std::size_t views_of_faces) {
   std::size_t vertices = 0, faces = 0;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     vertices += mesh_of(scene, m).positions.size();
-    faces += mesh_of(scene, m).faces.size();
+    faces += mesh_of(scene, m).faces.size() / views_of_faces;
   }
   const std::size_t samples = samples_of_side(scene.width, raster) * samples_of_side(scene.height, raster);
   const std::size_t largest =

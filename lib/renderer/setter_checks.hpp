@@ -43,7 +43,8 @@ Raster raster_of(const Scene& scene);
 
 /// Most views of the scene that a frame may have, so that all counts over them fit their types: pixels, the
 /// raster's samples, vertices and faces.
-std::size_t most_views(const Scene& scene, const Raster& raster = {});
+/// `views_of_faces`: see Renderer::Impl::set_scene().
+std::size_t most_views(const Scene& scene, const Raster& raster = {}, std::size_t views_of_faces = 1);
 
 /// Throws InvalidArgument where the depth range, or gamma in it, or the lengths that lighting squares are
 /// beyond single precision.

@@ -54,23 +54,41 @@ bool light_may_jump(const Mesh& mesh, const WeldedEdge& edge) {
   });
 }
 
+/// The faces of a mesh that a view sees, from the row of its own on, and the number of the first among those of the
+/// view.
+struct SeenFaces {
+  const Mesh& mesh;
+  std::size_t first_row, faces, first_face;
+};
+
+/// With the mesh's rows for the faces seen.
+WeldedEdge by_row(WeldedEdge edge, const SeenFaces& seen) {
+  edge.face += to_uint(seen.first_row);
+  if (edge.other) *edge.other += to_uint(seen.first_row);
+  return edge;
+}
+
 cl_uint side_of(const WeldedEdge& edge, std::size_t first_face) {
   return 3 * (to_uint(first_face) + edge.face) + edge.corner;
 }
 
-cl_uint2 row_of(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_face) {
-  cl_uint2 row{{side_of(edge, first_face), DPR_NO_FACE}};
+cl_uint2 row_of(const SeenFaces& seen, const WeldedEdge& of_seen) {
+  const Mesh& mesh = seen.mesh;
+  const WeldedEdge edge = by_row(of_seen, seen);
+  cl_uint2 row{{side_of(of_seen, seen.first_face), DPR_NO_FACE}};
   if (!edge.other) return row;
-  row.s[1] = (to_uint(first_face) + *edge.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
+  row.s[1] = (to_uint(seen.first_face) + *of_seen.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
   if (mesh.vertex_colors.empty() && !mesh.face_colors.empty()) row.s[0] |= DPR_EDGE_FLAG;
   if (is_seam(mesh, edge)) row.s[0] |= DPR_EDGE_SEAM;
   if (light_may_jump(mesh, edge)) row.s[1] |= DPR_EDGE_SEAM;
   return row;
 }
 
-shared::OpenEdge open_edge(const Mesh& mesh, const WeldedEdge& edge, std::size_t first_face) {
+shared::OpenEdge open_edge(const SeenFaces& seen, const WeldedEdge& of_seen) {
+  const Mesh& mesh = seen.mesh;
+  const WeldedEdge edge = by_row(of_seen, seen);
   shared::OpenEdge open{};
-  open.side = side_of(edge, first_face);
+  open.side = side_of(of_seen, seen.first_face);
   open.texture = mesh.textures.empty() ? k_no_texture : texture_of(mesh, edge.face);
   open.material = to_uint(material_of(mesh, edge.face));
   if (open.texture == k_no_texture) return open;
@@ -105,37 +123,79 @@ std::size_t number_of(const WeldedEdge& edge, std::span<const cl_uint> numbers) 
 
 }  // namespace
 
-Edges::Edges(Device::Impl& device, const Scene& scene) : device_(device), launch_(device) {
-  constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
+namespace {
+
+/// Edges of what a view sees: in the order of their numbers, the open ones, and the numbers by face.
+struct SeenEdges {
   std::vector<cl_uint2> rows;
-  std::vector<cl_uint> all_numbers;
   std::vector<shared::OpenEdge> open;
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const Mesh& mesh = mesh_of(scene, m);
-    const std::size_t first_face = all_numbers.size();
-    if (first_face + mesh.faces.size() > k_most) {
-      throw InvalidArgument("faces (scene)", "more than " + std::to_string(k_most),
-                            "at most that many with noise of the pixel");
-    }
-    const std::vector<WeldedEdge> of_mesh = make_edges(mesh.faces, mesh.positions.size());
-    const std::vector<cl_uint> numbers = number_edges(of_mesh, mesh.faces.size(), rows.size());
-    rows.resize(rows.size() + of_mesh.size());
-    for (const WeldedEdge& edge : of_mesh) {
-      rows[number_of(edge, numbers)] = row_of(mesh, edge, first_face);
-      if (edge.is_open) open.push_back(open_edge(mesh, edge, first_face));
-    }
-    all_numbers.insert(all_numbers.end(), numbers.begin(), numbers.end());
-    solids.emplace_back(of_mesh, mesh.faces.size());
+  std::vector<cl_uint> numbers;
+};
+
+/// Adds those of some more faces; returns the solid that they are.
+Solid add_edges(const SeenFaces& seen, SeenEdges& edges) {
+  const std::span faces(seen.mesh.faces.data() + seen.first_row, seen.faces);
+  const std::vector<WeldedEdge> found = make_edges(faces, seen.mesh.positions.size());
+  const std::vector<cl_uint> numbers = number_edges(found, seen.faces, edges.rows.size());
+  edges.rows.resize(edges.rows.size() + found.size());
+  for (const WeldedEdge& edge : found) {
+    edges.rows[number_of(edge, numbers)] = row_of(seen, edge);
+    if (edge.is_open) edges.open.push_back(open_edge(seen, edge));
   }
-  count = rows.size();
-  if (rows.empty()) rows.emplace_back();  // never read, but an argument all the same
+  edges.numbers.insert(edges.numbers.end(), numbers.begin(), numbers.end());
+  return {found, seen.faces};
+}
+
+template <class Element>
+void append(std::vector<Element>& all, std::vector<Element>&& more) {
+  if (all.empty()) {
+    all = std::move(more);
+  } else {
+    all.insert(all.end(), more.begin(), more.end());
+  }
+}
+
+}  // namespace
+
+Edges::Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces)
+    : device_(device), launch_(device) {
+  constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
+  std::vector<SeenEdges> all(views_of_faces);
+  for (std::size_t view = 0; view < views_of_faces; ++view) {
+    std::size_t first_face = 0;
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      const Mesh& mesh = mesh_of(scene, m);
+      const std::size_t faces = mesh.faces.size() / views_of_faces;
+      if (first_face + faces > k_most) {
+        throw InvalidArgument("faces (scene)", "more than " + std::to_string(k_most),
+                              "at most that many with noise of the pixel");
+      }
+      solids.push_back(add_edges({mesh, view * faces, faces, first_face}, all[view]));
+      first_face += faces;
+    }
+    count = std::max(count, all[view].rows.size());
+    open_count_ = std::max(open_count_, all[view].open.size());
+  }
+  std::vector<cl_uint2> rows;
+  std::vector<cl_uint> numbers;
+  std::vector<shared::OpenEdge> open;
+  shared::OpenEdge none{};
+  none.side = DPR_NO_SIDE;
+  for (SeenEdges& of_view : all) {
+    // Between a face and itself, which is never a contour; and one that is never read, but an argument all the same.
+    of_view.rows.resize(std::max<std::size_t>(count, 1));
+    of_view.open.resize(open_count_, none);
+    append(rows, std::move(of_view.rows));
+    append(numbers, std::move(of_view.numbers));
+    append(open, std::move(of_view.open));
+  }
   edges.upload(device, rows);
-  face_edges.upload(device, all_numbers);
+  face_edges.upload(device, numbers);
   open_.upload(device, open);
 }
 
 void Edges::join(const shared::FrameParams& p, const Geometry& geometry) {
-  const std::size_t copies = p.position_stride != 0 ? p.views : 1, open = open_.size();
+  const std::size_t copies = p.position_stride != 0 ? p.views : 1, open = open_count_;
   const std::size_t rows = std::max<std::size_t>(count, 1);
   if (edges.size() != copies * rows) {
     Buffer<cl_uint2> copied(device_, copies * rows);

@@ -12,25 +12,25 @@ namespace dpr {
 class Edges {
  public:
   /// By the vertices that faces share. Throws InvalidArgument for more faces than can be numbered.
-  Edges(Device::Impl& device, const Scene& scene);
+  /// `views_of_faces`: see Geometry.
+  Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces = 1);
 
   /// Joins those that coincide where vertices lie now. To be called before edges are read, after positions
   /// have changed, or p.position_stride or, where that is set, p.views. Does not wait for the device.
   void join(const shared::FrameParams& p, const Geometry& geometry);
 
-  std::size_t count = 0;
-  std::vector<Solid> solids;   ///< [mesh], for the first who wants them
+  std::size_t count = 0;       ///< of a view
+  std::vector<Solid> solids;   ///< [mesh] of each view of faces, for the first who wants them
   Buffer<cl_uint2> edges;      ///< [edge] see DPR_EDGE_FLAG; [view][edge] where p.position_stride is set
   Buffer<cl_uint> face_edges;  ///< [face] see DPR_FACE_SIDES
 
   std::size_t bytes() const;
 
  private:
-  void add(const Mesh& mesh, std::size_t first_face);
-
   Device::Impl& device_;
   Launcher<kernel::edges_list, kernel::edges_join> launch_;
-  Buffer<shared::OpenEdge> open_;  // [open edge]
+  Buffer<shared::OpenEdge> open_;  // [open edge], of each view of faces
+  std::size_t open_count_ = 0;     // of a view
   Buffer<cl_uint> heads_, next_;
 };
 

@@ -5,14 +5,24 @@ namespace {
 
 constexpr cl_uint k_corner_channels = 9;
 
+/// The frame as if the faces that views have of their own were those of one view: as incidences number them.
+shared::FrameParams by_rows(shared::FrameParams p) {
+  if (p.own_faces == 0) return p;
+  p.faces *= p.views;
+  p.views = 1;
+  return p;
+}
+
 }  // namespace
 
 void Gather::per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
                       const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
+  const shared::FrameParams rows = by_rows(p);
+  const std::size_t of_rows = p.views / rows.views * targets;
   grad.resize(device_, p.views * targets);
   sum_chunks(p, bin, k_corner_channels, partial);
-  launch_(p.views * targets, kernel::gather_corners{.p = p,
-                                                    .targets = static_cast<cl_uint>(targets),
+  launch_(p.views * targets, kernel::gather_corners{.p = rows,
+                                                    .targets = to_uint(of_rows),
                                                     .sum_views = 0U,
                                                     .pair_starts = bin.pair_starts,
                                                     .face_pairs = bin.face_pairs,
@@ -28,7 +38,7 @@ void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const
                         const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
   grad.resize(device_, targets);
   sum_chunks(p, bin, k_corner_channels, partial);
-  launch_(targets, kernel::gather_corners{.p = p,
+  launch_(targets, kernel::gather_corners{.p = by_rows(p),
                                           .targets = static_cast<cl_uint>(targets),
                                           .sum_views = 1U,
                                           .pair_starts = bin.pair_starts,
@@ -43,16 +53,17 @@ void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const
 
 void Gather::over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
                         const PairSums& partial, Buffer<float>& channels) {
-  channels.resize(device_, std::size_t{DPR_MATERIAL_CHANNELS} * p.faces);
+  const shared::FrameParams rows = by_rows(p);
+  channels.resize(device_, std::size_t{DPR_MATERIAL_CHANNELS} * rows.faces);
   sum_chunks(p, bin, DPR_MATERIAL_CHANNELS, partial);
-  launch_(p.faces, kernel::gather_faces{.p = p,
-                                        .pair_starts = bin.pair_starts,
-                                        .face_pairs = bin.face_pairs,
-                                        .ordered = materials.faces,
-                                        .partial = partial.values,
-                                        .first = partial.first,
-                                        .chunks = chunks_,
-                                        .channels = channels});
+  launch_(rows.faces, kernel::gather_faces{.p = rows,
+                                           .pair_starts = bin.pair_starts,
+                                           .face_pairs = bin.face_pairs,
+                                           .ordered = materials.faces,
+                                           .partial = partial.values,
+                                           .first = partial.first,
+                                           .chunks = chunks_,
+                                           .channels = channels});
 }
 
 void Gather::sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels,

@@ -10,17 +10,22 @@
 namespace dpr {
 namespace {
 
-Incidence make_incidence(Device::Impl& device, std::span<const cl_uint4> faces, std::size_t targets) {
-  std::vector<cl_uint> starts(targets + 1, 0), corners(faces.size() * 3);
-  for (const cl_uint4& face : faces) {
-    for (int corner = 0; corner < 3; ++corner) ++starts[face.s[corner] + 1];
+/// Of targets that are numbered by view: of `views` views that each have as many of the faces, [view][target].
+Incidence make_incidence(Device::Impl& device, std::span<const cl_uint4> faces, std::size_t targets,
+                         std::size_t views = 1) {
+  const std::size_t of_view = faces.size() / views;
+  std::vector<cl_uint> starts(views * targets + 1, 0), corners(faces.size() * 3);
+  const auto target_of = [&](std::size_t face, std::size_t corner) {
+    return (views == 1 ? 0 : face / of_view * targets) + faces[face].s[corner];
+  };
+  for (std::size_t face = 0; face < faces.size(); ++face) {
+    for (std::size_t corner = 0; corner < 3; ++corner) ++starts[target_of(face, corner) + 1];
   }
-  for (std::size_t target = 0; target < targets; ++target) starts[target + 1] += starts[target];
+  for (std::size_t target = 0; target < views * targets; ++target) starts[target + 1] += starts[target];
   std::vector<cl_uint> next(starts.begin(), starts.end() - 1);
   for (std::size_t face = 0; face < faces.size(); ++face) {
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      corners[next[faces[face].s[corner]]++] = to_uint(face * 3 + corner);
-    }
+    for (std::size_t corner = 0; corner < 3; ++corner)
+      corners[next[target_of(face, corner)]++] = to_uint(face * 3 + corner);
   }
   Incidence incidence;
   incidence.starts.upload(device, starts);
@@ -125,7 +130,7 @@ void write_range(Device::Impl& device, const Buffer<cl_float4>& buffer, std::siz
   device.write(buffer.cl_buffer(), first * sizeof(cl_float4), std::as_bytes(values));
 }
 
-Geometry::Geometry(Device::Impl& device, const Scene& scene) {
+Geometry::Geometry(Device::Impl& device, const Scene& scene, std::size_t views) : views_of_faces(views) {
   std::vector<cl_float4> all_positions;
   std::vector<cl_uint> all_mesh;
   std::vector<cl_uint4> all_faces;
@@ -149,13 +154,13 @@ Geometry::Geometry(Device::Impl& device, const Scene& scene) {
     all_mesh.resize(vertices, to_uint(m));
   }
   position_count = all_positions.size();
-  faces = all_faces.size();
-  if (faces > std::numeric_limits<cl_uint>::max() / 3) {
-    throw InvalidArgument("faces (scene)", std::to_string(faces), "at most 2^32 / 3");
+  if (all_faces.size() > std::numeric_limits<cl_uint>::max() / 3) {
+    throw InvalidArgument("faces (scene)", std::to_string(all_faces.size()), "at most 2^32 / 3");
   }
+  faces = all_faces.size() / views_of_faces;
   positions.upload(device, all_positions);
   vertex_mesh.upload(device, all_mesh);
-  vertex_corners = make_incidence(device, all_faces, vertices);
+  vertex_corners = make_incidence(device, all_faces, vertices, views_of_faces);
   add_colors(device, scene, all_faces);
   if (is_textured(scene)) add_textures(device, scene, all_faces);
   if (gives_normals(scene)) add_normals(device, scene, all_faces);
@@ -209,7 +214,7 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<
   colors = all_colors.size();
   color_values.upload(device, all_colors);
   if (by_vertex) return;
-  color_faces = all_faces.size() - faces;
+  color_faces = all_faces.size() - rows();
   color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors);
 }
 

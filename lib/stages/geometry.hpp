@@ -12,10 +12,11 @@
 
 namespace dpr {
 
-/// Corners (face * 3 + corner) by what they refer to, in order: a compressed sparse row.
+/// Corners (row * 3 + corner) by what they refer to, in order: a compressed sparse row. Vertices of views with faces
+/// of their own are by [view][vertex].
 struct Incidence {
   Buffer<cl_uint> starts;   ///< [target + 1]
-  Buffer<cl_uint> corners;  ///< [face * 3]
+  Buffer<cl_uint> corners;  ///< [row * 3]
 };
 
 /// Ranges of a mesh in the joined buffers. An instance has vertices, and as many given normals, of its own;
@@ -84,15 +85,17 @@ struct Opacities {
 };
 
 struct Geometry {
-  Geometry(Device::Impl& device, const Scene& scene);
+  /// `views_of_faces`: see Renderer::Impl::set_scene().
+  Geometry(Device::Impl& device, const Scene& scene, std::size_t views_of_faces = 1);
 
-  std::size_t vertices = 0, position_count = 0, faces = 0, colors = 0;
-  std::vector<MeshRange> meshes;  ///< instances among them
+  std::size_t views_of_faces;
+  std::size_t vertices = 0, position_count = 0, faces = 0, colors = 0;  ///< `faces` of a view
+  std::vector<MeshRange> meshes;                                        ///< instances among them
 
   Buffer<cl_float4> positions;       ///< [position] object space
   Buffer<shared::MeshPlace> places;  ///< [mesh]
   Buffer<cl_uint> vertex_mesh;       ///< [vertex]
-  /// [face] vertex indices; w = mesh. Then, where they are others, and each from its place on: indices of the
+  /// [row], faces of one view after the other, vertex indices; w = mesh. Then, where they are others, and each from its place on: indices of the
   /// corners' colours, w = material; of their texture coordinates, w = texture or DPR_NO_TEXTURE; of their
   /// normals: a vertex, or the number of vertices + a given one; of their opacities.
   Buffer<cl_uint4> face_vertices;
@@ -105,6 +108,9 @@ struct Geometry {
   SurfaceMaterials materials;
   Opacities opacities;
 
+  bool has_own_faces() const { return views_of_faces > 1; }
+  /// Faces of all views that have some of their own.
+  std::size_t rows() const { return views_of_faces * faces; }
   const Incidence& normal_corners() const {
     return given_normals.empty() ? vertex_corners : given_normals.corners;
   }

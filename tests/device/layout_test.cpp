@@ -39,6 +39,7 @@ std::vector<Entry> entries() {
           DPR_FIELD(FrameParams, faces),
           DPR_FIELD(FrameParams, position_stride),
           DPR_FIELD(FrameParams, color_stride),
+          DPR_FIELD(FrameParams, own_faces),
           DPR_FIELD(FrameParams, first_view),
           DPR_FIELD(FrameParams, width),
           DPR_FIELD(FrameParams, height),

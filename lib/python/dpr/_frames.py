@@ -6,7 +6,7 @@ import weakref
 
 import numpy as np
 
-from . import _arrays, _library
+from . import _arrays, _library, _merged
 
 WITH_GRADIENTS = {"depth": 1, "position": 3, "normal": 3, "texcoords": 2}
 """Outputs with gradients, and how many numbers a pixel of theirs has."""
@@ -145,13 +145,6 @@ def _faces_beyond(zfar, vertices, faces, views):
     return int(is_beyond[:, faces].all(2).sum()) if is_beyond.any() else 0
 
 
-def _warning(frame, zfar, arrays):
-    if frame.is_empty():
-        return NOTHING_RENDERED
-    count = _faces_beyond(zfar, arrays["vertices"], arrays["faces"], arrays["views"]) if zfar is not None else 0
-    return f"dpr: {count} triangles lie beyond zfar ({zfar:g}) and were left out" if count else None
-
-
 class Rendered:
     """A call's frames, and what they show.
 
@@ -163,35 +156,56 @@ class Rendered:
         """arrays: of float32, int32 or int64; wanted: indices of those whose gradients gradients() may be asked for."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
         self.spec, self._shapes, self._frames, self.warning = spec, [array.shape for array in arrays], [], None
-        zfar = next((float(text[5:]) for text in reversed(spec.settings) if text.startswith("zfar=")), None)
         frames = frames_of(spec.parts)
         views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
         shapes = shapes_of(spec, len(views) if views.ndim else 0)
         raw = {name: np.empty(shape[:3] + (4,) if name in WITH_GRADIENTS else shape, dtype)
                for name, (shape, dtype) in zip(["image", *spec.outputs], shapes)}
-        for i, (settings, parts) in enumerate(frames):
-            rows = slice(i, i + 1) if len(frames) > 1 else slice(None)
-            gradients = [part.name for part in parts if part.leaf in wanted]
-            named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
-            has_mesh = any(part.name == "faces" for part in parts)
-            try:
-                frame = Frame(options_of(spec, settings, i, gradients), named if has_mesh else named + NO_MESH)
-            except _library.InvalidArgument as error:
-                if len(frames) == 1:
-                    raise
-                text = str(error).replace("(dpr.render)", f"(view {i})").replace("meshes[0]", f"view {i}")
-                raise _library.InvalidArgument(text) from None
-            _library.call("dpr_frame_read", frame.handle, *c_arrays([(name, array[rows]) for name, array in raw.items()]))
-            self._frames.append((frame, parts, rows))
-            if has_mesh:
-                self.warning = self.warning or _warning(frame, zfar, dict(named))
+        for group in _merged.groups_of(spec, frames, arrays):
+            self._render(group, frames, arrays, wanted, raw)
         self._sums = {name: raw[name] for name in spec.outputs if name in WITH_GRADIENTS}
         self.outputs = [_means(name, array)[0].reshape(shape) if name in WITH_GRADIENTS else array
                         for (name, array), (shape, _) in zip(raw.items(), shapes)]
 
+    def _render(self, group, frames, arrays, wanted, raw):
+        """Renders a group of frames, by their numbers, as one, and reads what it shows."""
+        own = [frames[i] for i in group]
+        lot = _merged.Merged(own, arrays) if len(own) > 1 else _merged.Single(*own[0], arrays, len(frames) == 1)
+        rows = slice(None) if len(frames) == 1 else group
+        has_mesh = any(name == "faces" for name, _ in lot.named)
+        options = options_of(self.spec, lot.settings, group[0], lot.names(wanted))
+        try:
+            frame = Frame(options, lot.named if has_mesh else lot.named + NO_MESH)
+        except _library.InvalidArgument as error:
+            if len(frames) == 1:
+                raise
+            if len(group) > 1:  # by itself each says what is wrong, or is rendered
+                return [self._render([i], frames, arrays, wanted, raw) for i in group]
+            text = str(error).replace("(dpr.render)", f"(view {group[0]})").replace("meshes[0]", f"view {group[0]}")
+            raise _library.InvalidArgument(text) from None
+        found = {name: array if rows == slice(None) else np.empty_like(array[rows], order="C") for name, array in raw.items()}
+        _library.call("dpr_frame_read", frame.handle, *c_arrays(list(found.items())))
+        if rows != slice(None):
+            for name, array in found.items():
+                raw[name][rows] = array
+        self._frames.append((frame, lot, rows))
+        if has_mesh:
+            self._warn(frame, [parts for _, parts in own], arrays, found["image"])
+
+    def _warn(self, frame, parts, arrays, images):
+        """Notes that a view shows nothing, or that triangles lie beyond zfar."""
+        zfar = next((float(text[5:]) for text in reversed(self.spec.settings) if text.startswith("zfar=")), None)
+        if frame.is_empty() or (len(parts) > 1 and not images[..., 3].any((1, 2)).all()):
+            self.warning = self.warning or NOTHING_RENDERED
+        for of_view in parts if zfar is not None else ():
+            named = {part.name: part.of(arrays[part.leaf]) for part in of_view}
+            count = _faces_beyond(zfar, named["vertices"], named["faces"], named["views"])
+            if count:
+                self.warning = self.warning or f"dpr: {count} triangles lie beyond zfar ({zfar:g}) and were left out"
+
     def constants(self, wanted):
         """The outputs, as numbers of them, that depend on none of the wanted arrays."""
-        names = {part.name for _, parts, _ in self._frames for part in parts if part.leaf in wanted}
+        names = {part.name for _, parts in frames_of(self.spec.parts) for part in parts if part.leaf in wanted}
         return [1 + i for i, name in enumerate(self.spec.outputs)
                 if name in OTHERS or not names & _OF_OUTPUTS]
 
@@ -204,16 +218,10 @@ class Rendered:
             grad = np.asarray(grad, np.float32)
             raw[name] = np.ascontiguousarray(grad if name == "image" else _gradient_of_means(name, self._sums[name], grad))
         totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in wanted}
-        for frame, parts, rows in self._frames:
-            parts = [part for part in parts if part.leaf in totals]
-            # The only frame that has all of an array fills that array.
-            found = [part.of(totals[part.leaf]) if len(self._frames) == 1 else np.empty_like(part.of(totals[part.leaf]))
-                     for part in parts]
-            _library.call("dpr_frame_backward", frame.handle, *c_arrays([(name, grad[rows]) for name, grad in raw.items()]),
-                          *c_arrays([(part.name, array) for part, array in zip(parts, found)]))
-            if len(self._frames) > 1:
-                for part, array in zip(parts, found):
-                    part.of(totals[part.leaf])[...] += array
+        for frame, lot, rows in self._frames:
+            of_images, found = [(name, grad[rows]) for name, grad in raw.items()], lot.gradients(totals)
+            _library.call("dpr_frame_backward", frame.handle, *c_arrays(of_images), *c_arrays(found))
+            lot.add(found, totals)
         return totals
 
     def tangents(self, given):
@@ -226,14 +234,9 @@ class Rendered:
         given = {leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}
         count = len(next(iter(given.values())))
         images = np.empty((count, *self.outputs[0].shape), np.float32)
-        for frame, parts, rows in self._frames:
-            named = []
-            for part in parts:
-                if part.leaf in given:
-                    tangent = given[part.leaf]
-                    own = tangent if part.row is None else np.stack([part.of(direction) for direction in tangent])
-                    named.append((part.name, own.reshape(count, -1)))
-            found = images if len(self._frames) == 1 else np.empty_like(images[:, rows])
+        for frame, lot, rows in self._frames:
+            named = lot.tangents(given, count)
+            found = images if rows == slice(None) else np.empty_like(images[:, rows], order="C")
             _library.call("dpr_frame_tangent", frame.handle, count, *c_arrays(named), found.ctypes.data, found.size)
             if found is not images:
                 images[:, rows] = found

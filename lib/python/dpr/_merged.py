@@ -1,0 +1,207 @@
+"""Unlike meshes of a call, each in its own view, side by side in one frame: one set of launches renders them all."""
+import numpy as np
+
+_OF_ALL = ("background", "sigma", "gamma", "alpha")
+"""Arrays that are one for all views of a frame, as lights are."""
+_KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "texcoords", "face_texcoords", "face_textures",
+          "materials.specular", "materials.shininess", "face_materials", *_OF_ALL}
+_OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
+_MOST_PADDING, _SMALL = 2, 4096
+"""Times as many faces and vertices, with padding, as the meshes have, beyond so many."""
+_MOST_PIXELS = 1 << 24
+
+
+def _is_of_all(name):
+    return name in _OF_ALL or name.startswith("lights.")
+
+
+def _split(settings):
+    """{"wrap": [words], ...}"""
+    return {name: words.split(",") for name, words in (text.split("=") for text in settings)}
+
+
+def _kind(settings, parts, arrays):
+    """What frames must have in common to be one; None of one that stays alone."""
+    names = {part.name for part in parts}
+    textures = {name for name in names if name.startswith("textures[")}
+    if "faces" not in names or not names - textures <= _KNOWN | {name for name in names if name.startswith("lights.")} or \
+            any(part.name in textures and arrays[part.leaf].shape[-1] == 4 for part in parts):
+        return None
+    fixed = names - textures - {"face_texcoords", "face_textures", "face_materials"}
+    return frozenset(_split(settings)), bool(textures), frozenset(fixed), tuple(sorted(part for part in parts if _is_of_all(part.name)))
+
+
+def groups_of(spec, frames, arrays):
+    """Lists of the numbers of frames, of (settings, parts), that are rendered as one."""
+    alone = [[i] for i in range(len(frames))]
+    # Noise that is drawn has the numbers of the views in the call.
+    if len(frames) == 1 or not set(spec.outputs) <= _OUTPUTS or any("monte_carlo" in text for text in spec.settings):
+        return alone
+    kinds, groups = {}, []
+    for i, (settings, parts) in enumerate(frames):
+        kind = _kind(settings, parts, arrays)
+        sizes = {part.name: part.of(arrays[part.leaf]).size // 3 for part in parts if part.name in ("faces", "vertices")}
+        kinds.setdefault(i if kind is None else kind, []).append((sizes.get("faces"), sizes.get("vertices"), i))
+    for members in kinds.values():
+        group = []
+        for member in sorted(members):
+            counts = np.array([*group, member])
+            if group and ((len(counts) * counts.max(0) > _SMALL + _MOST_PADDING * counts.sum(0))[:2].any()
+                          or len(counts) * spec.width * spec.height > _MOST_PIXELS):
+                groups.append(group)
+                group = []
+            group.append(member)
+        groups.append(group)
+    return sorted(sorted(i for _, _, i in group) for group in groups)
+
+
+class Single:
+    """A frame's arrays as they are; `is_only`: the call has no other frame."""
+
+    def __init__(self, settings, parts, arrays, is_only):
+        self.settings, self.parts, self._is_only = settings, parts, is_only
+        self.named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
+
+    def names(self, wanted):
+        return [part.name for part in self.parts if part.leaf in wanted]
+
+    def gradients(self, totals):
+        """[(name, array to fill)]; the only frame fills the totals themselves."""
+        own = [(part.name, part.of(totals[part.leaf])) for part in self.parts if part.leaf in totals]
+        return own if self._is_only else [(name, np.empty_like(array)) for name, array in own]
+
+    def add(self, found, totals):
+        """Adds what gradients() gave, and was filled, to the totals."""
+        if self._is_only:
+            return
+        parts = [part for part in self.parts if part.leaf in totals]
+        for part, (_, array) in zip(parts, found):
+            part.of(totals[part.leaf])[...] += array
+
+    def tangents(self, given, count):
+        """[(name, [count, ...])]"""
+        named = []
+        for part in self.parts:
+            if part.leaf in given:
+                tangent = given[part.leaf]
+                own = tangent if part.row is None else np.stack([part.of(direction) for direction in tangent])
+                named.append((part.name, own.reshape(count, -1)))
+        return named
+
+
+class Merged:
+    """The arrays of several frames in those of one: vertices, faces and what is by these are padded to as many in every
+    view, coordinates of textures, textures and materials follow one another."""
+
+    def __init__(self, frames, arrays):
+        """frames: (settings, parts) of each"""
+        self._views, self._shapes = len(frames), {}
+        self._places = []  # (part, name, its place in the array of that name)
+        frames = [(settings, parts, {part.name: part.of(arrays[part.leaf]) for part in parts}) for settings, parts in frames]
+        self.settings = _settings_of_all(frames)
+        meshes = [mesh for _, _, mesh in frames]
+        self._vertices = max(mesh["vertices"].size // 3 for mesh in meshes)
+        self._faces = max(mesh["faces"].size // 3 for mesh in meshes)
+        self._next = {"texcoords": 0, "textures": 0, "materials": 0}
+        indices = []
+        for view, (_, parts, mesh) in enumerate(frames):
+            indices.append(self._indices(mesh))
+            for part in parts:
+                self._place(view, part, mesh)
+            self._next["texcoords"] += mesh.get("texcoords", np.empty(0)).size // 2
+            self._next["textures"] += _texture_count(mesh)
+            self._next["materials"] += _material_count(mesh)
+        self.named = [(name, np.stack([of_view[name] for of_view in indices])) for name in indices[0]]
+        merged = self._room()
+        for part, name, place in self._places:
+            own = part.of(arrays[part.leaf])
+            merged[name][place] = own.reshape(merged[name][place].shape)
+            if name == "vertices":  # others lie where the first does
+                merged[name][place[0], place[1].stop:] = own.reshape(-1, 3)[:1]
+        self.named += list(merged.items())
+
+    def _indices(self, mesh):
+        """Faces, and what they refer to, of a view."""
+        faces = mesh["faces"].reshape(-1, 3).astype(np.int64)
+        count = len(faces)
+        found = {"faces": faces}
+        if "texcoords" in mesh:
+            corners = mesh.get("face_texcoords")
+            if corners is None:
+                of_corners = mesh["texcoords"].shape == (count, 3, 2)
+                corners = np.arange(3 * count).reshape(-1, 3) if of_corners else faces
+            found["face_texcoords"] = corners.reshape(-1, 3) + self._next["texcoords"]
+            textures = mesh.get("face_textures", np.zeros(count, np.int64)).astype(np.int64)
+            found["face_textures"] = np.where(textures < 0, textures, textures + self._next["textures"])
+        if _material_count(mesh):
+            found["face_materials"] = mesh.get("face_materials", np.zeros(count, np.int64)) + self._next["materials"]
+        return {name: np.concatenate([rows, np.zeros((self._faces - count, *rows.shape[1:]), np.int64)])
+                for name, rows in found.items()}
+
+    def _place(self, view, part, mesh):
+        """Where a part's numbers are, and how large their array is at least."""
+        name, own = part.name, mesh[part.name]
+        if name in ("faces", "face_texcoords", "face_textures", "face_materials"):
+            return
+        if _is_of_all(name):
+            if view > 0:
+                return
+            place, shape = ..., own.shape
+        elif name in ("views", "intrinsics"):
+            place, shape = view, (self._views, *own.shape[1:])
+        elif name in ("vertices", "colors", "face_colors"):
+            most = self._faces if name == "face_colors" else self._vertices
+            place, shape = (view, slice(0, own.size // 3)), (self._views, most, 3)
+        elif name.startswith("textures["):
+            name, place, shape = f"textures[{self._next['textures'] + int(name[9:-1])}]", ..., own.shape
+        else:
+            per_row = {"texcoords": 2, "materials.specular": 3, "materials.shininess": 1}[name]
+            first = self._next[name.split(".")[0]]
+            rows = own.size // per_row
+            place, shape = slice(first, first + rows), (first + rows,) + (per_row,) * (per_row > 1)
+        self._shapes[name] = shape
+        self._places.append((part, name, place))
+
+    def _room(self, leaves=None):
+        """{name: zeros} of arrays with numbers of these leaves, or of all."""
+        names = dict.fromkeys(name for part, name, _ in self._places if leaves is None or part.leaf in leaves)
+        return {name: np.zeros(self._shapes[name], np.float32) for name in names}
+
+    def names(self, wanted):
+        return list(self._room(wanted))
+
+    def gradients(self, totals):
+        return list(self._room(totals).items())
+
+    def add(self, found, totals):
+        found = dict(found)
+        for part, name, place in self._places:
+            if part.leaf in totals:
+                total = part.of(totals[part.leaf])
+                total[...] += found[name][place].reshape(total.shape)
+
+    def tangents(self, given, count):
+        moved = {name: np.zeros((count, *array.shape), np.float32) for name, array in self._room(given).items()}
+        for part, name, place in self._places:
+            if part.leaf in given:
+                for direction, tangent in zip(moved[name], given[part.leaf]):
+                    direction[place] = part.of(tangent).reshape(direction[place].shape)
+        return [(name, array.reshape(count, -1)) for name, array in moved.items()]
+
+
+def _texture_count(mesh):
+    return sum(name.startswith("textures[") for name in mesh)
+
+
+def _settings_of_all(frames):
+    """Words of textures: a word of every texture of every frame."""
+    words = {}
+    for settings, _, mesh in frames:
+        for name, own in _split(settings).items():
+            words.setdefault(name, []).extend(own * _texture_count(mesh) if len(own) == 1 else own)
+    return [f"{name}={','.join(own)}" for name, own in words.items()]
+
+
+def _material_count(mesh):
+    specular, shininess = mesh.get("materials.specular"), mesh.get("materials.shininess")
+    return specular.size // 3 if specular is not None else 0 if shininess is None else shininess.size

@@ -1,0 +1,174 @@
+"""Unlike meshes in one call of the Python package `dpr`: one frame has what as many have, each mesh by itself."""
+import sys
+import unittest
+from unittest import mock
+
+try:
+    import numpy as np
+except ImportError:
+    print("skipped: no python3-numpy")
+    sys.exit(0)
+
+import dpr
+from dpr import _frames, _merged
+
+SIZE = 24
+NOISES = {"pixel": {"preset": "pixel", "blur": 0.7, "gamma": 1e-5}, "triangles": {"sigma": 1e-3, "gamma": 0.05}}
+RANDOM = np.random.default_rng(3)
+
+
+def random(*shape):
+    return RANDOM.random(shape, np.float32)
+
+
+def sphere(rings, sectors):
+    """A closed mesh, with one vertex a pole and others in rings."""
+    angles = np.pi * np.arange(1, rings) / rings
+    turns = 2 * np.pi * np.arange(sectors) / sectors
+    ring = np.stack([np.sin(angles)[:, None] * np.cos(turns), np.repeat(np.cos(angles)[:, None], sectors, 1),
+                     -np.sin(angles)[:, None] * np.sin(turns)], -1).reshape(-1, 3)
+    vertices = np.concatenate([[[0, 1, 0]], ring, [[0, -1, 0]]]).astype(np.float32)
+    faces = []
+    for k in range(sectors):
+        following = (k + 1) % sectors
+        faces.append([0, 1 + k, 1 + following])
+        for row in range(rings - 2):
+            a, b = 1 + row * sectors + k, 1 + row * sectors + following
+            faces += [[a, a + sectors, b], [b, a + sectors, b + sectors]]
+        last = 1 + (rings - 2) * sectors
+        faces.append([len(vertices) - 1, last + following, last + k])
+    return vertices + 0.05 * random(*vertices.shape), np.array(faces)
+
+
+def split(vertices, faces):
+    """The same with vertices of each face by itself: edges lie in one place, and are joined there."""
+    return vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+
+
+MESHES = [sphere(4, 5), split(*sphere(3, 6)), sphere(5, 7), sphere(3, 4)]
+VERTICES, FACES = [vertices for vertices, _ in MESHES], [faces for _, faces in MESHES]
+VIEWS = np.concatenate([dpr.look_at([np.sin(turn), 0.5, 3 * np.cos(turn)]) for turn in (0.1, 0.4, 0.7, 1.0)])
+LENS = dpr.perspective(40, SIZE, SIZE)
+LIGHTS = {"ambient": np.float32([0.3, 0.3, 0.3]), "point": np.float32([[1, 2, 4, 0.5, 0.5, 0.5, 0.4, 0.4, 0.4]])}
+
+
+def of_each(shape_of, make=random):
+    return [make(*shape_of(vertices, faces)) for vertices, faces in MESHES]
+
+
+def textured():
+    materials = [{"specular": random(2, 3), "shininess": 3 + random(2)} for _ in MESHES]
+    return {"texcoords": [random(len(VERTICES[0]), 2), random(len(FACES[1]), 3, 2), random(9, 2), random(len(VERTICES[3]), 2)],
+            "face_texcoords": [None, None, RANDOM.integers(0, 9, (len(FACES[2]), 3)), None],
+            "textures": [[random(5, 4, 3)], [random(3, 7, 3), random(2, 2, 3)], [random(6, 6, 3)], [random(4, 4, 3)]],
+            "face_textures": [None, RANDOM.integers(-1, 2, len(FACES[1])), None, None],
+            "wrap": [["mirror"], ["clamp", "repeat"], ["repeat"], ["mirror"]], "filter": "trilinear",
+            "materials": materials, "face_materials": of_each(lambda _, f: (len(f),), lambda n: RANDOM.integers(0, 2, n))}
+
+
+VARIANTS = {
+    "white": {},
+    "colours of vertices": {"colors": of_each(lambda v, f: (len(v), 3))},
+    "colours of faces": {"face_colors": of_each(lambda v, f: (len(f), 3))},
+    "flat light": {"lights": LIGHTS, "shading": "flat", "colors": of_each(lambda v, f: (len(v), 3))},
+    "smooth light": {"lights": LIGHTS, "shading": "phong", "face_colors": of_each(lambda v, f: (len(f), 3))},
+    "textures": textured(),
+    "textures in the light": {"lights": LIGHTS, "shading": "gouraud", **textured()},
+    "near the camera": {"colors": of_each(lambda v, f: (len(v), 3)), "znear": 2.3, "zfar": 3.5},
+}
+
+
+def flat(value):
+    """Arrays of nested lists and dictionaries, in order."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, (list, tuple)):
+        return [array for item in value for array in flat(item)]
+    return [] if value is None else [value]
+
+
+def rendered(arguments, noise, is_merged, outputs=()):
+    """(images, outputs, gradients, number of frames)"""
+    given = dict(arguments)
+    settings = {name: given.pop(name) for name in ("shading", "znear", "zfar") if name in given}
+    renderer = dpr.Renderer(SIZE, SIZE, **NOISES[noise], **settings)
+    frames = []
+    render = _frames.Frame.__init__
+
+    def counted(self, *arguments):
+        frames.append(self)
+        return render(self, *arguments)
+
+    alone = mock.patch.object(_merged, "groups_of", lambda spec, frames, arrays: [[i] for i in range(len(frames))])
+    with mock.patch.object(_frames.Frame, "__init__", counted):
+        if not is_merged:
+            alone.start()
+        try:
+            found, pullback = renderer.vjp(VERTICES, FACES, VIEWS, LENS, outputs=outputs, **given)
+        finally:
+            mock.patch.stopall()
+        image, others = found if outputs else (found, {})
+        return image, others, pullback(np.sin(np.arange(image.size, dtype=np.float32)).reshape(image.shape)), len(frames)
+
+
+class ListsTest(unittest.TestCase):
+    def assert_close(self, found, expected, tolerance, what):
+        scale = max(np.abs(expected).max(), 1e-3)
+        self.assertLess(np.abs(found - expected).max() / scale, tolerance, what)
+
+    def test_one_frame_has_what_each_has_alone(self):
+        for noise in NOISES:
+            for name, arguments in VARIANTS.items():
+                with self.subTest(noise=noise, variant=name):
+                    image, _, gradients, count = rendered(arguments, noise, True)
+                    expected, _, of_each_alone, count_alone = rendered(arguments, noise, False)
+                    self.assertEqual((count, count_alone), (1, 4))
+                    self.assertGreater(np.abs(expected).max(), 0.2)
+                    self.assert_close(image, expected, 1e-6, name)
+                    for found, other in zip(flat(gradients), flat(of_each_alone)):
+                        self.assertEqual(found.shape, other.shape)
+                        self.assert_close(found, other, 2e-5, name)
+
+    def test_outputs(self):
+        outputs = ["face_id", "barycentrics", "effective_faces"]
+        for noise in NOISES:
+            (_, found, _, count), (_, expected, _, _) = (rendered({}, noise, is_merged, outputs) for is_merged in (True, False))
+            self.assertEqual(count, 1)
+            np.testing.assert_array_equal(found["face_id"], expected["face_id"])
+            for name in outputs[1:]:
+                self.assert_close(found[name], expected[name], 1e-5, name)
+        self.assertEqual(rendered({}, "pixel", True, ["depth"])[3], 4)
+
+    def test_tangents(self):
+        colors = VARIANTS["colours of vertices"]["colors"]
+        tangents = {"vertices": [random(2, *vertices.shape) for vertices in VERTICES], "views": random(2, 4, 4, 4)}
+        for noise in NOISES:
+            renderer = dpr.Renderer(SIZE, SIZE, **NOISES[noise])
+            _, moved = renderer.jvp(VERTICES, FACES, VIEWS, LENS, colors=colors, tangents=tangents)
+            for i, (vertices, faces) in enumerate(MESHES):
+                of_mesh = {"vertices": tangents["vertices"][i], "views": tangents["views"][:, i:i + 1]}
+                _, alone = renderer.jvp(vertices, faces, VIEWS[i:i + 1], LENS, colors=colors[i], tangents=of_mesh)
+                self.assertGreater(np.abs(alone).max(), 1e-3)
+                self.assert_close(moved[:, i:i + 1], alone, 1e-5, noise)
+
+    def test_groups(self):
+        def groups(sizes, **arguments):
+            meshes, found = [sphere(3, size) for size in sizes], []
+            group = _merged.groups_of
+            with mock.patch.object(_merged, "groups_of", lambda *given: found.append(group(*given)) or found[-1]):
+                dpr.render([vertices for vertices, _ in meshes], [faces for _, faces in meshes],
+                           np.repeat(VIEWS[:1], len(sizes), 0), LENS, width=SIZE, height=SIZE, **arguments)
+            return found[0]
+
+        self.assertEqual(groups([4, 6, 5]), [[0, 1, 2]])
+        self.assertEqual(groups([4, 4000, 5, 3000]), [[0, 2], [1, 3]])
+        self.assertEqual(groups([4, 6], estimator="monte_carlo"), [[0], [1]])
+
+    def test_a_mesh_that_shows_nothing_is_told(self):
+        far = [VERTICES[0], VERTICES[2] + np.float32([0, 99, 0])]
+        with self.assertWarnsRegex(UserWarning, "every triangle was dropped"):
+            dpr.render(far, [FACES[0], FACES[2]], VIEWS[:2], LENS, width=SIZE, height=SIZE)
+
+
+if __name__ == "__main__":
+    unittest.main()
