@@ -171,7 +171,7 @@ class Rendered:
         """Renders a group of frames, by their numbers, as one, and reads what it shows."""
         own = [frames[i] for i in group]
         lot = _merged.Merged(own, arrays) if len(own) > 1 else _merged.Single(*own[0], arrays, len(frames) == 1)
-        rows = slice(None) if len(frames) == 1 else group
+        rows = slice(None) if len(group) == len(frames) else group
         has_mesh = any(name == "faces" for name, _ in lot.named)
         options = options_of(self.spec, lot.settings, group[0], lot.names(wanted))
         try:
