@@ -3,7 +3,7 @@
  * made of it. dpr/dpr.h includes this.
  *
  *   vertices             [V, 3] or [N, V, 3]  world space, of every view by itself or the same in all
- *   faces                [F, 3]               whole numbers: indices of vertices
+ *   faces                [F, 3] or [N, F, 3]  whole numbers: indices of vertices
  *   views                [N, 4, 4]            world to camera, OpenGL axes, acting on column vectors; affine
  *   intrinsics           [N, 4]               fx, fy, cx, cy in pixels from the corner of the top-left pixel
  *                     or [N, 9]               the same, and OpenCV's k1, k2, p1, p2, k3 of the lens
@@ -32,7 +32,13 @@
  *                                             specular
  *   sigma, gamma, alpha  [] or [1]            instead of the settings'
  *
- * Textures and lights may have a leading dimension of 1. Outputs, and their gradients:
+ * Textures and lights may have a leading dimension of 1. With faces [N, F, 3] each view shows a mesh of its own, at the
+ * launches of one. Of fewer faces than others the last are (0, 0, 0), of fewer vertices the last lie where another does.
+ * Then vertices are [N, V, 3], colours [N, V, 3] or [N, F, 3], texture coordinates [T, 2] with face_texcoords; those,
+ * face_textures and face_materials have N in front, and refer to lists of all meshes. Opacities are refused, and so are
+ * outputs with gradients but the image, and uv.
+ *
+ * Outputs, and their gradients:
  *
  *   image                [N, height, width, 4]  linear RGB over the background, and alpha, the silhouette
  *   depth, position,     [N, height, width, 4]  as dpr_attribute_create() has them: sums over faces, weight

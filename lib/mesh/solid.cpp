@@ -30,7 +30,7 @@ bool is_inner(const WeldedEdge& edge) { return edge.other && !edge.same_directio
 
 }  // namespace
 
-Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) {
+Solid::Solid(std::span<const WeldedEdge> edges, std::size_t faces) : faces_(faces) {
   may_be_closed_ = !edges.empty() && std::ranges::all_of(edges, [](const WeldedEdge& edge) {
     return edge.is_open || is_inner(edge);
   });
@@ -78,6 +78,7 @@ std::vector<double> volumes_of(std::span<const glm::vec3> positions, std::span<c
 
 int Solid::winding(std::span<const glm::vec3> positions, std::span<const glm::uvec3> faces) const {
   if (!may_be_closed_) return 0;
+  faces = faces.first(faces_);
   std::vector<WeldedEdge> joined = open_edges_;
   join_open(positions, faces, joined);
   if (!std::ranges::all_of(joined, is_inner)) return 0;

@@ -11,7 +11,7 @@ namespace dpr {
 class Solid {
  public:
   Solid() = default;
-  /// `edges` are those of the faces: make_edges().
+  /// `edges` are those of the first so many faces: make_edges(). Others have no part in it.
   Solid(std::span<const WeldedEdge> edges, std::size_t faces);
 
   /// +1 where the faces of all parts wind counter-clockwise as seen from outside, -1 clockwise: the sign of
@@ -23,6 +23,7 @@ class Solid {
 
  private:
   bool may_be_closed_ = false;
+  std::size_t faces_ = 0;
   std::vector<WeldedEdge> open_edges_;
   std::vector<std::uint32_t> patch_of_face_;  // joined by vertices; empty where all are one
   std::uint32_t patches_ = 0;

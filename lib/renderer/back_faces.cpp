@@ -14,8 +14,37 @@ void BackFaces::forget(std::size_t mesh) noexcept {
   states_[mesh] = {std::move(states_[mesh].solid), /*is_measured*/ true};
 }
 
+namespace {
+
+constexpr std::size_t k_many_faces = 1U << 16U;
+
+}  // namespace
+
+std::vector<int> BackFaces::windings_of(const Scene& scene, const Geometry& geometry,
+                                        std::span<const glm::vec3> positions) const {
+  std::vector<int> windings;
+  const std::size_t views = positions.size() / geometry.position_count;
+  for (std::size_t view = 0; view < views; ++view) {
+    const std::span of_view = positions.subspan(view * geometry.position_count, geometry.position_count);
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      if (const auto source = scene.meshes[m].instance_of) {
+        windings.push_back(windings[view * scene.meshes.size() + *source]);
+        continue;
+      }
+      const std::vector<glm::uvec3>& all = scene.meshes[m].mesh.faces;
+      const std::size_t count = all.size() / geometry.views_of_faces;
+      const std::span faces(all.data() + (geometry.has_own_faces() ? view * count : 0), count);
+      const Solid& solid = states_[geometry.has_own_faces() ? view : m].solid;
+      const MeshRange& range = geometry.meshes[m];
+      windings.push_back(count >= k_many_faces
+                             ? 0
+                             : solid.winding(of_view.subspan(range.first_position, range.vertices), faces));
+    }
+  }
+  return windings;
+}
+
 void BackFaces::measure(const Scene& scene, const std::function<void(std::size_t mesh)>& measure_on_device) {
-  constexpr std::size_t k_many_faces = 1U << 16U;
   for (std::size_t m = 0; m < states_.size(); ++m) {
     State& state = states_[m];
     if (state.is_measured || scene.meshes[m].instance_of) continue;
@@ -44,11 +73,12 @@ float BackFaces::hidden_of(int winding, const BoxCorners& box, const Camera& cam
 }
 
 std::vector<float> BackFaces::hidden(const Scene& scene, std::span<const View> views, ClipPlanes& clip_planes,
-                                     float depth_reach) const {
+                                     float depth_reach, std::span<const int> of_shapes) const {
   std::vector<float> hidden;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    for (std::size_t m = 0; m < states_.size(); ++m) {
-      const int winding = states_[scene.meshes[m].instance_of.value_or(m)].winding;
+    for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+      const int winding = of_shapes.empty() ? states_[scene.meshes[m].instance_of.value_or(m)].winding
+                                            : of_shapes[v * scene.meshes.size() + m];
       hidden.push_back(winding == 0 ? 0.0F
                                     : hidden_of(winding, clip_planes.box_of(scene, v, m), views[v].camera,
                                                 views[v].transforms[m], depth_reach));

@@ -200,11 +200,12 @@ void Renderer::Impl::find_edges() {
   has_moved = false;
 }
 
-/// Hides no faces of views with shapes of their own, of which none are known to be hidden.
+/// Of shapes that the device alone knows none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
-  const bool may_hide = pixel_noise && layers == 1 && frame.position_stride == 0 && !has_device_poses &&
-                        scene.cull == Cull::none;
+  const bool has_shapes = frame.position_stride != 0;
+  const bool may_hide = pixel_noise && layers == 1 && (!has_shapes || clip_planes.knows_views()) &&
+                        !has_device_poses && scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none)) {
     hides_by_device_ = false;
@@ -214,9 +215,16 @@ void Renderer::Impl::hide_back_faces() {
   hides_by_device_ = false;
   if (may_hide) {
     BackFaces& back_faces = pixel_noise->back_faces;
-    back_faces.measure(scene, [&](std::size_t mesh) { setup.measure(*geometry, scene, mesh); });
-    hides_by_device_ = back_faces.are_on_device();
-    hidden = back_faces.hidden(scene, views, clip_planes, depth_reach(scene.smoothing));
+    if (has_shapes) {
+      if (shape_windings_.empty())
+        shape_windings_ = back_faces.windings_of(scene, *geometry, shape_positions_);
+      shape_positions_.clear();
+    } else {
+      back_faces.measure(scene, [&](std::size_t mesh) { setup.measure(*geometry, scene, mesh); });
+      hides_by_device_ = back_faces.are_on_device();
+    }
+    hidden = back_faces.hidden(scene, views, clip_planes, depth_reach(scene.smoothing),
+                               has_shapes ? std::span<const int>(shape_windings_) : std::span<const int>());
   }
   if (hidden == uploaded_hidden_) return;
   uploaded_hidden_.clear();

@@ -309,7 +309,9 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
   Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;
-  bool hides_by_device_ = false;  // Setup::hide() has the last word
+  std::vector<glm::vec3> shape_positions_;  // of views' own shapes, until their windings are known
+  std::vector<int> shape_windings_;         // [view][mesh] BackFaces::windings_of()
+  bool hides_by_device_ = false;            // Setup::hide() has the last word
 
   Buffer<float> gradient_sums_;  // of sum_gradients()
   GradientSums summed_;          // what they are

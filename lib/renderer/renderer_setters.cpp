@@ -290,10 +290,13 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   write_range(impl_of(device), spare_view_positions_, 0, to_cl(positions));
   write_range(impl_of(device), spare_view_colors_, 0, to_cl(colors));
   std::vector<BoxCorners> boxes = ClipPlanes::boxes_of(positions, *geometry);
+  shape_positions_.reserve(positions.size());
 
   std::swap(geometry->view_positions, spare_view_positions_);
   std::swap(geometry->view_colors, spare_view_colors_);
   clip_planes.set_boxes_of_views(std::move(boxes));
+  shape_positions_.assign(positions.begin(), positions.end());
+  shape_windings_.clear();
   frame.position_stride = positions.empty() ? 0 : static_cast<cl_uint>(geometry->position_count);
   frame.color_stride = colors.empty() ? 0 : static_cast<cl_uint>(geometry->colors);
   has_moved = true;

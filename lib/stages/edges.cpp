@@ -143,7 +143,9 @@ Solid add_edges(const SeenFaces& seen, SeenEdges& edges) {
     if (edge.is_open) edges.open.push_back(open_edge(seen, edge));
   }
   edges.numbers.insert(edges.numbers.end(), numbers.begin(), numbers.end());
-  return {found, seen.faces};
+  const auto is_point = [](const glm::uvec3& face) { return face.x == face.y && face.y == face.z; };
+  const auto last = std::ranges::find_if_not(faces.rbegin(), faces.rend(), is_point);  // behind it is padding
+  return {found, static_cast<std::size_t>(faces.rend() - last)};
 }
 
 template <class Element>

@@ -13,7 +13,7 @@ import dpr
 from dpr import _frames, _merged
 
 SIZE = 24
-NOISES = {"pixel": {"preset": "pixel", "blur": 0.7, "gamma": 1e-5}, "triangles": {"sigma": 1e-3, "gamma": 0.05}}
+NOISES = {"pixel": {"preset": "pixel", "blur": 0.7}, "triangles": {"sigma": 1e-3, "gamma": 0.05}}
 RANDOM = np.random.default_rng(3)
 
 
@@ -163,6 +163,25 @@ class ListsTest(unittest.TestCase):
         self.assertEqual(groups([4, 6, 5]), [[0, 1, 2]])
         self.assertEqual(groups([4, 4000, 5, 3000]), [[0, 2], [1, 3]])
         self.assertEqual(groups([4, 6], estimator="monte_carlo"), [[0], [1]])
+
+    def test_refused(self):
+        spec = dpr.Renderer(SIZE, SIZE)._spec()
+        faces = np.stack([FACES[0], FACES[0]])
+        vertices = np.stack([VERTICES[0], VERTICES[0]])
+        given = {"vertices": vertices, "faces": faces, "views": VIEWS[:2], "intrinsics": np.repeat(LENS, 2, 0)}
+        count = len(VERTICES[0])
+
+        def frame(**other):
+            return _frames.Frame(_frames.options_of(spec), [(name, np.ascontiguousarray(array))
+                                                            for name, array in {**given, **other}.items()])
+
+        frame()
+        for name, wrong in {"vertices": vertices[0], "faces": np.stack([FACES[0]] * 3), "colors": random(count, 3),
+                            "opacities": random(count), "face_colors": random(len(FACES[0]), 3)}.items():
+            with self.subTest(name), self.assertRaisesRegex(dpr.InvalidArgument, name):
+                frame(**{name: wrong})
+        with self.assertRaisesRegex(dpr.InvalidArgument, "face_texcoords"):
+            frame(**{"texcoords": random(count, 2), "textures[0]": random(4, 4, 3)})
 
     def test_a_mesh_that_shows_nothing_is_told(self):
         far = [VERTICES[0], VERTICES[2] + np.float32([0, 99, 0])]

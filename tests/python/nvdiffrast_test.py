@@ -2,6 +2,7 @@
 import io
 import sys
 import unittest
+from unittest import mock
 
 try:
     import numpy as np
@@ -12,6 +13,7 @@ except ImportError:
 
 import dpr.nvdiffrast as dr
 import tensors
+from dpr import _clip_frames
 from tensors import differences, random
 
 H, W = 40, 56
@@ -111,7 +113,9 @@ class NvdiffrastTest(tensors.TestCase):
         tri = torch.cat([torch.from_numpy(CUBE_FACES), 8 + torch.from_numpy(FLOOR_FACES)])
         attr, ranges = random(12, 3), torch.tensor([[0, 12], [12, 2], [3, 0]], dtype=torch.int32)
         leaf = pos.requires_grad_()
-        rast, rast_db = dr.rasterize(CONTEXT, leaf, tri, [H, W], ranges=ranges)
+        with mock.patch.object(_clip_frames, "_Frame", wraps=_clip_frames._Frame) as made:
+            rast, rast_db = dr.rasterize(CONTEXT, leaf, tri, [H, W], ranges=ranges)
+        self.assertEqual(made.call_count, 1)
         color, derivatives = dr.interpolate(attr, rast, tri, rast_db, "all")
         image = dr.antialias(color, rast, leaf, tri)
         (image * random(*image.shape)).sum().backward()

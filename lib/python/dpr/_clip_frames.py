@@ -3,7 +3,7 @@ import collections
 
 import torch
 
-from . import _clip_space, _rows, _torch
+from . import _clip_space, _merged, _rows, _torch
 from ._renderer import Renderer
 
 _SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
@@ -12,25 +12,27 @@ _PLANE_ROUNDING = 1e-6
 
 
 class _Frame:
-    """Samples of N shapes of one topology.
+    """Samples of N shapes of one topology, or of N meshes of as many triangles and vertices.
 
-    faces, first  the triangles, and the index of the first one in tri
+    faces   [F, 3], or [N, F, 3], the triangles of each
+    firsts  [N], the index of each one's first triangle in tri
     """
 
-    def __init__(self, device, pos, faces, first, size, call, layers):
+    def __init__(self, device, pos, faces, firsts, size, call, layers):
         """pos: [N, V, 4]; size: (height, width). Shows the last of so many layers."""
         height, width = size
-        self.faces, self.first, self._height, self._width, self._call = faces, first, height, width, call
+        self.faces, self.firsts, self._height, self._width, self._call = faces, firsts, height, width, call
         camera, self.vertices = self._placed(pos)
         renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
         self._camera = camera
         views_and_intrinsics = camera.views_and_intrinsics(len(pos), width, height)
-        self._samples = renderer._rasterize(self.vertices, faces, *views_and_intrinsics, layers).layers[-1]
+        self._samples = renderer._rasterize(self.vertices, faces, *views_and_intrinsics, layers, as_one=True).layers[-1]
         self._has_gradient = self.vertices.requires_grad
 
     def _placed(self, pos):
-        used = torch.zeros(pos.shape[1], dtype=torch.bool)
-        used[self.faces.long().reshape(-1)] = True
+        used = torch.full((pos.shape[1],), self.faces.ndim == 3)
+        if self.faces.ndim == 2:
+            used[self.faces.long().reshape(-1)] = True
         camera = _clip_space.camera_of(pos, used, "dpr.nvdiffrast." + self._call)
         return camera, camera.vertices(pos, used, self._width, self._height)
 
@@ -40,14 +42,16 @@ class _Frame:
 
     def rast(self, pos, grad_db):
         """([N, H, W, 4], [N, H, W, 4])"""
-        samples, faces = self._samples, self.faces.long()
+        samples, count_of_faces = self._samples, self.faces.shape[-2]
+        faces = self.faces.long().reshape(-1, 3)
         face_id, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
         count = face_id.numel()
         covered = (face_id >= 0).reshape(-1).nonzero()[:, 0]
         face = face_id.reshape(-1).index_select(0, covered)
         shape = covered.div(self._height * self._width, rounding_mode="floor")
+        row = face + shape * count_of_faces if self.faces.ndim == 3 else face
         corners = [corner.contiguous() for corner in
-                   (faces.index_select(0, face) + (shape * pos.shape[1])[:, None]).unbind(1)]
+                   (faces.index_select(0, row) + (shape * pos.shape[1])[:, None]).unbind(1)]
         weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
         of_w = pos[..., 3].reshape(-1)
         if self._camera.is_perspective:
@@ -60,17 +64,17 @@ class _Frame:
             weights = weights / torch.stack([of_w.index_select(0, corner) for corner in corners], 1)
             weights = weights / weights.sum(1, keepdim=True)
         is_seen = of_depth.abs() <= 1 + _PLANE_ROUNDING
-        number = (face + (1 + self.first)).to(pos.dtype)
+        number = (face + 1 + self.firsts.index_select(0, shape)).to(pos.dtype)
         found = torch.cat([weights[:, :2], of_depth[:, None], number[:, None]], 1) * is_seen[:, None]
         derivatives = self._derivatives(*((pos, weights) if grad_db else (pos.detach(), weights.detach())), corners,
-                                        shape * len(faces) + face)
+                                        shape * count_of_faces + face)
         return tuple(_rows.spread(table, covered, count).reshape(*face_id.shape, 4)
                      for table in (found, derivatives * is_seen[:, None]))
 
     def _derivatives(self, pos, weights, corners, place):
         """[K, 4]: du/dX, du/dY, dv/dX, dv/dY per pixel, of weights [K, 3]. place: shape times faces plus face."""
         table = pos.reshape(-1, 4)
-        if len(pos) * len(self.faces) <= len(place):
+        if len(pos) * self.faces.shape[-2] <= len(place):
             shapes = torch.arange(len(pos))[:, None, None] * pos.shape[1]
             slopes = _slopes(_rows.rows(table, (self.faces.long() + shapes).reshape(-1)).reshape(-1, 3, 4))
             slopes = _rows.rows(slopes, place)
@@ -108,38 +112,89 @@ def _slopes(corners):
     return torch.cat([slopes[:, 0], slopes[:, 1], slopes.sum(1)], 1).to(corners.dtype)
 
 
+class _Part:
+    """Images of a rasterize() call that one frame has.
+
+    images  their numbers
+    index   [N, V], of the vertices in pos; None of a whole pos [N, V, 4]
+    """
+
+    def __init__(self, images, index, frame=None):
+        self.images, self._index, self.frame = images, index, frame
+
+    def positions(self, pos):
+        """[N, V, 4]"""
+        if self._index is None:
+            return pos
+        return _rows.rows(pos, self._index.reshape(-1)).reshape(*self._index.shape, 4)
+
+
+def _mesh_of(tri):
+    """(indices [V] of the vertices, triangles of these) of triangles; an index that none uses is another's instead."""
+    tri = tri.long()
+    least = int(tri.min())
+    faces = tri - least
+    used = torch.zeros(int(faces.max()) + 1, dtype=torch.bool).index_fill_(0, faces.reshape(-1), True)
+    return torch.where(used, least + torch.arange(len(used)), tri[0, 0]), faces
+
+
 class Frames:
-    """Frames of one layer of one rasterize() call: one for all images, or with ranges one for each; None for an empty
-    range. layers: as many surfaces as the layer's number, from 1 on."""
+    """Frames of one layer of one rasterize() call: one for all images; with ranges, one for those of alike sizes, and none
+    for empty ranges. layers: as many surfaces as the layer's number, from 1 on."""
 
     def __init__(self, device, pos, tri, ranges, size, call, layers=1):
         self.device, self.tri, self.ranges, self.layers, self._size = device, tri, ranges, layers, size
-        pos, ranges = _shapes(pos), [(0, len(tri))] if ranges is None else ranges
-        self._frames = [_Frame(device, pos, tri[first:first + count], first, size, call, layers) if count else None
-                        for first, count in ranges]
+        if ranges is None:
+            frame = _Frame(device, pos, tri, torch.zeros(len(pos), dtype=torch.long), size, call, layers)
+            self._parts = [_Part(list(range(len(pos))), None, frame)]
+            return
+        self._parts = []
+        meshes = {image: _mesh_of(tri[first:first + count]) for image, (first, count) in enumerate(ranges) if count}
+        sizes = {True: [], False: []}
+        for image, (index, faces) in meshes.items():
+            corners = pos.detach()[None, index]
+            camera = _clip_space.camera_of(corners, torch.ones(len(index), dtype=torch.bool), "dpr.nvdiffrast." + call)
+            sizes[camera.is_perspective].append((len(faces), len(index), image))
+        pad = torch.nn.utils.rnn.pad_sequence
+        for alike in filter(None, sizes.values()):
+            for images in _merged.groups_by_size(alike, size[0] * size[1]):
+                index = pad([meshes[image][0] - meshes[image][0][0] for image in images], True)
+                index = index + torch.stack([meshes[image][0][0] for image in images])[:, None]
+                faces = pad([meshes[image][1] for image in images], True)
+                part = _Part(images, index)
+                firsts = torch.tensor([ranges[image][0] for image in images])
+                part.frame = _Frame(device, part.positions(pos), faces, firsts, size, call, layers)
+                self._parts.append(part)
 
     def __reduce__(self):
         """Copies and pickles of rast have no frames, and are rasterized again."""
         return collections.OrderedDict, ()
 
+    def _in_order(self, of_parts, others):
+        """The parts' images, [N, H, W, C], in the order of their numbers, and those of the others where there is no part."""
+        count = len(others)
+        numbers = [image for part in self._parts for image in part.images]
+        if numbers == list(range(count)):
+            return torch.cat(of_parts) if len(of_parts) > 1 else of_parts[0]
+        places = torch.tensor([numbers.index(i) if i in numbers else len(numbers) + i for i in range(count)])
+        return torch.cat([*of_parts, others]).index_select(0, places)
+
     def rast(self, pos, grad_db):
-        empty = pos.new_zeros(1, *self._size, 4)
-        parts = [(empty, empty) if frame is None else frame.rast(_shapes(pos), grad_db) for frame in self._frames]
-        return tuple(torch.cat(images) if len(images) > 1 else images[0] for images in zip(*parts))
+        """([N, H, W, 4], [N, H, W, 4])"""
+        empty = pos.new_zeros(len(pos) if self.ranges is None else len(self.ranges), *self._size, 4)
+        found = [part.frame.rast(part.positions(pos), grad_db) for part in self._parts]
+        return self._in_order([rast for rast, _ in found], empty), self._in_order([db for _, db in found], empty)
 
     def vertices_of(self, pos, tri):
-        """Each frame's vertices; None if any frame belongs to other positions."""
+        """Each part's vertices; None if any belongs to other positions."""
         if tri is not self.tri and not torch.equal(tri.long(), self.tri.long()):
             return None
-        found = [None if frame is None else frame.vertices_of(_shapes(pos)) for frame in self._frames]
-        return None if any(frame is not None and own is None for frame, own in zip(self._frames, found)) else found
+        if (pos.ndim == 2) != (self.ranges is not None):
+            return None
+        found = [part.frame.vertices_of(part.positions(pos)) for part in self._parts]
+        return None if any(own is None for own in found) else found
 
     def antialias(self, color, vertices, boost):
-        colors = [color] if self.ranges is None else color.split(1)
-        images = [part if frame is None else frame.antialias(part, own, boost)
-                  for frame, part, own in zip(self._frames, colors, vertices)]
-        return torch.cat(images) if len(images) > 1 else images[0]
-
-
-def _shapes(pos):
-    return pos if pos.ndim == 3 else pos[None]
+        found = [part.frame.antialias(color if len(part.images) == len(color) else color.index_select(0, torch.tensor(part.images)), own, boost)
+                 for part, own in zip(self._parts, vertices)]
+        return self._in_order(found, color)

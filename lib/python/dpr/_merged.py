@@ -37,22 +37,30 @@ def groups_of(spec, frames, arrays):
     # Noise that is drawn has the numbers of the views in the call.
     if len(frames) == 1 or not set(spec.outputs) <= _OUTPUTS or any("monte_carlo" in text for text in spec.settings):
         return alone
-    kinds, groups = {}, []
+    kinds = {}
     for i, (settings, parts) in enumerate(frames):
         kind = _kind(settings, parts, arrays)
         sizes = {part.name: part.of(arrays[part.leaf]).size // 3 for part in parts if part.name in ("faces", "vertices")}
         kinds.setdefault(i if kind is None else kind, []).append((sizes.get("faces"), sizes.get("vertices"), i))
-    for members in kinds.values():
-        group = []
-        for member in sorted(members):
-            counts = np.array([*group, member])
-            if group and ((len(counts) * counts.max(0) > _SMALL + _MOST_PADDING * counts.sum(0))[:2].any()
-                          or len(counts) * spec.width * spec.height > _MOST_PIXELS):
-                groups.append(group)
-                group = []
-            group.append(member)
-        groups.append(group)
-    return sorted(sorted(i for _, _, i in group) for group in groups)
+    pixels = spec.width * spec.height
+    return sorted(group for members in kinds.values() for group in groups_by_size(members, pixels))
+
+
+def groups_by_size(meshes, pixels):
+    """Lists of the numbers of meshes, of (faces, vertices, number), that are padded to the largest in images of so many
+    pixels."""
+    groups, faces, vertices, most = [[]], 0, 0, 0
+    for mesh in sorted(meshes):
+        group = [*groups[-1], mesh]
+        faces, vertices, most = faces + mesh[0], vertices + mesh[1], max(most, mesh[1])
+        fits = (len(group) * mesh[0] <= _SMALL + _MOST_PADDING * faces and len(group) * most <= _SMALL + _MOST_PADDING * vertices
+                and len(group) * pixels <= _MOST_PIXELS)
+        if fits or len(group) == 1:
+            groups[-1] = group
+        else:
+            groups.append([mesh])
+            faces, vertices, most = mesh[0], mesh[1], mesh[1]
+    return [sorted(number for _, _, number in group) for group in groups]
 
 
 class Single:

@@ -263,8 +263,9 @@ def _count_views(cameras, mesh, lights):
     return counts[0] if counts else 1
 
 
-def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, outputs, copy):
-    """(Spec, Plan) of Renderer.__call__()'s arguments; smoothing: those of sigma, blur, gamma and alpha."""
+def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, outputs, copy, as_one=False):
+    """(Spec, Plan) of Renderer.__call__()'s arguments; smoothing: those of sigma, blur, gamma and alpha. as_one: faces
+    [N, F, 3] are padded as one frame takes them."""
     known = [*WITH_GRADIENTS, *OTHERS]
     if isinstance(outputs, str):
         fail(TypeError, "outputs", repr(outputs), "a list of names")
@@ -301,7 +302,7 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
         elif value is not None:
             settings.append(setting(name, value))
 
-    if _has_views(mesh["faces"], 2):
+    if _has_views(mesh["faces"], 2) and not as_one:
         mesh = _lists_of_padded(mesh)
     if isinstance(mesh["faces"], (list, tuple)):
         lists = _lists_of_meshes(mesh, count)

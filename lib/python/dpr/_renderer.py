@@ -138,8 +138,8 @@ class Renderer:
         Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and likewise of their
         colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
         may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices [N, V,
-        3]. A mesh without faces shows the background. They are rendered one after the other, each with a node of its
-        own in the graph; so are views that have textures or lights by themselves.
+        3]. A mesh without faces shows the background. Those of alike sizes share their launches; but see-through ones,
+        outputs with gradients, Monte Carlo, and views with lights by themselves are rendered one after the other.
 
         Arrays are of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the same, float32;
         nested lists of numbers are NumPy's. float32, int64 and int32 are read where they are, if packed and on the CPU;
@@ -247,8 +247,8 @@ class Renderer:
             _library.warn(samples._rasterized.warning)
         return samples
 
-    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):
-        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy})
+    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False, as_one=False):
+        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one)
         spec = spec._replace(settings=(*spec.settings, _plan.setting("layers", layers)))
         return _samples.rasterize(spec, plan, copy)
 
@@ -287,11 +287,11 @@ class Renderer:
     def _spec(self):
         return _spec_of(self.device, self.width, self.height, self._texts)
 
-    def _plan(self, vertices, faces, views, intrinsics, given):
+    def _plan(self, vertices, faces, views, intrinsics, given, as_one=False):
         mesh = {"vertices": vertices, "faces": faces, **{name: given[name] for name in _OF_A_MESH}}
         smoothing = {name: given[name] for name in ("sigma", "blur", "gamma", "alpha")}
         return _plan.of_call(self, mesh, views, intrinsics, given["background"], given["lights"], smoothing,
-                             given["outputs"], given["copy"])
+                             given["outputs"], given["copy"], as_one)
 
 
 def _result(spec, found, warning):
