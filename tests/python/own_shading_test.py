@@ -104,6 +104,38 @@ class OwnShadingTest(unittest.TestCase):
         samples.interpolate(depths).sum().backward()
         self.check_close(found, vertices.grad, 1e-3)
 
+    def test_padded_meshes(self):
+        """A tetrahedron and one of its faces."""
+        padding = np.float32([[99, 99, 99]])
+        vertices = np.stack([TETRAHEDRON, np.concatenate([0.9 * TETRAHEDRON[:3], padding])])
+        faces = np.stack([FACES, np.concatenate([FACES[:1], -np.ones((3, 3), np.int64)])])
+        colors = random(2, 4, 3, seed=8)
+        samples = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+        image, resolved = samples.resolve_with_vjp(shaded(samples, colors))
+        grad_values, by_contours = resolved(WEIGHTS)
+        corners = colors[np.arange(2)[:, None, None, None], faces[np.arange(2)[:, None, None], samples.face_id.clip(0)]]
+        inside = samples.pullback((corners * grad_values[..., None, :3]).sum(-1) * samples.mask[..., None])
+        if torch:
+            leaf = torch.from_numpy(vertices).requires_grad_()
+            tensors = RENDERER.rasterize(leaf, torch.from_numpy(faces), self.views, self.intrinsics)
+            mask = tensors.mask[..., None]
+            values = torch.where(mask, tensors.interpolate(colors), torch.from_numpy(BACKGROUND))
+            found = tensors.resolve(torch.cat([values, mask.float()], -1))
+            self.check_close(found.detach(), image, 1e-6)
+            (found * torch.from_numpy(WEIGHTS)).sum().backward()
+        for i, count in enumerate((4, 1)):
+            arguments = vertices[i, :4 - i], faces[i, :count], self.views[i:i + 1], self.intrinsics[i:i + 1]
+            expected, pullback = RENDERER.vjp(*arguments, colors=colors[i, :4 - i], background=BACKGROUND, wrt=["vertices"])
+            self.check_close(image[i:i + 1], expected, 1e-5)
+            gradient, wanted = (by_contours["vertices"] + inside["vertices"])[i, :4 - i], pullback(WEIGHTS[i:i + 1])["vertices"]
+            self.check_close(gradient, wanted, 1e-4)
+            if torch:
+                self.check_close(leaf.grad[i, :4 - i], wanted, 1e-4)
+        self.assertTrue((by_contours["vertices"][1, 3] == 0).all())
+        faces[1, 0, 1] = -1
+        with self.assertRaisesRegex(ValueError, "-1 behind it"):
+            RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+
     def test_layers(self):
         samples = RENDERER.rasterize(*self.arguments(), layers=3)
         front, back, none = samples.layers
@@ -253,7 +285,7 @@ class OwnShadingTest(unittest.TestCase):
                 RENDERER.rasterize(*self.arguments(), layers=layers)
         with self.assertRaisesRegex(ValueError, "layers"):
             dpr.Renderer(SIZE, SIZE, layers=2)
-        with self.assertRaisesRegex(ValueError, "2 meshes"):
+        with self.assertRaisesRegex(ValueError, "a list of 2"):
             dpr.rasterize([TETRAHEDRON, TETRAHEDRON], [FACES, FACES], self.views, self.intrinsics, width=SIZE, height=SIZE)
 
     @unittest.skipUnless(torch, "no PyTorch")

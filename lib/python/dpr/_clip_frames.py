@@ -26,7 +26,7 @@ class _Frame:
         renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
         self._camera = camera
         views_and_intrinsics = camera.views_and_intrinsics(len(pos), width, height)
-        self._samples = renderer._rasterize(self.vertices, faces, *views_and_intrinsics, layers, as_one=True).layers[-1]
+        self._samples = renderer._rasterize(self.vertices, faces, *views_and_intrinsics, layers).layers[-1]
         self._has_gradient = self.vertices.requires_grad
 
     def _placed(self, pos):

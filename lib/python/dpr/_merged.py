@@ -1,6 +1,8 @@
 """Unlike meshes of a call, each in its own view, side by side in one frame: one set of launches renders them all."""
 import numpy as np
 
+from . import _arrays
+
 _OF_ALL = ("background", "sigma", "gamma", "alpha")
 """Arrays that are one for all views of a frame, as lights are."""
 _KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "texcoords", "face_texcoords", "face_textures",
@@ -9,6 +11,13 @@ _OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
 _MOST_PADDING, _SMALL = 2, 4096
 """Times as many faces and vertices, with padding, as the meshes have, beyond so many."""
 _MOST_PIXELS = 1 << 24
+
+
+def require_padding(faces):
+    """Fails unless -1 is in the last rows of meshes' faces [N, F, 3] alone."""
+    is_there = faces[..., 0] >= 0
+    if (np.diff(is_there.astype(np.int8)) > 0).any() or (faces[is_there] < 0).any():
+        _arrays.fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
 
 
 def _is_of_all(name):
@@ -41,7 +50,7 @@ def groups_of(spec, frames, arrays):
     for i, (settings, parts) in enumerate(frames):
         kind = _kind(settings, parts, arrays)
         sizes = {part.name: part.of(arrays[part.leaf]).size // 3 for part in parts if part.name in ("faces", "vertices")}
-        kinds.setdefault(i if kind is None else kind, []).append((sizes.get("faces"), sizes.get("vertices"), i))
+        kinds.setdefault(i if kind is None else kind, []).append((sizes.get("faces", 0), sizes.get("vertices", 0), i))
     pixels = spec.width * spec.height
     return sorted(group for members in kinds.values() for group in groups_by_size(members, pixels))
 

@@ -8,6 +8,7 @@ import numpy as np
 from . import _arrays, _library
 from ._arrays import fail
 from ._frames import OTHERS, WITH_GRADIENTS, Spec
+from ._merged import require_padding
 
 _FLOATS = ("vertices", "colors", "face_colors", "opacities", "face_opacities", "texcoords")
 _INDICES = ("faces", "face_texcoords", "face_textures", "face_materials")
@@ -214,10 +215,9 @@ def _lists_of_meshes(meshes, views):
 def _lists_of_padded(meshes):
     """A padded batch as lists of the rows' beginnings."""
     faces = _arrays.to_numpy(_arrays.converted("faces", meshes["faces"], True))
+    require_padding(faces)
     face_counts = [int((mesh[:, 0] >= 0).sum()) for mesh in faces]
     of_faces = [mesh[:count] for mesh, count in zip(faces, face_counts)]
-    if any((mesh < 0).any() for mesh in of_faces):
-        fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
     vertex_counts = [int(mesh.max()) + 1 if len(mesh) else 0 for mesh in of_faces]
     texcoords = meshes["texcoords"]
     if _has_views(texcoords, 3):  # of corners

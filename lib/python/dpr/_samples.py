@@ -7,7 +7,7 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from . import _arrays, _frames, _library, _numpy
+from . import _arrays, _frames, _library, _merged, _numpy
 
 Array = Any
 _NAMES = ("face_id", "barycentrics", "depth")
@@ -26,7 +26,7 @@ class Rasterized:
         self._parts = [part for part in parts if part.leaf in wanted]
         self.leaves = [part.leaf for part in self._parts]  # those with derivatives
         self._shapes = [array.shape for array in arrays]
-        named = [(part.name, part.of(arrays[part.leaf])) for part in parts]
+        named = _unpadded({part.name: part.of(arrays[part.leaf]) for part in parts})
         if not any(part.name == "faces" for part in parts):
             named += _frames.NO_MESH
         options = _frames.options_of(spec, settings, 0, [part.name for part in self._parts])
@@ -106,6 +106,22 @@ class Rasterized:
                                  if part.leaf in given])
 
 
+def _unpadded(arrays):
+    """(name, array) pairs in which meshes of a batch, faces [N, F, 3], are padded as frames take them: with faces of one
+    vertex, and vertices at the place of the first one."""
+    faces = arrays.get("faces")
+    if faces is None or faces.ndim < 3:
+        return list(arrays.items())
+    _merged.require_padding(faces)
+    arrays = {**arrays, "faces": faces.clip(0)}
+    if arrays["vertices"].ndim < 3:
+        return list(arrays.items())  # is refused
+    is_there = np.arange(arrays["vertices"].shape[-2]) <= faces.max((1, 2))[:, None]
+    first = np.take_along_axis(arrays["vertices"], faces.clip(0)[:, :1, :1], 1)
+    vertices = np.where(is_there[..., None], arrays["vertices"], first)
+    return list({**arrays, "vertices": vertices}.items())
+
+
 def _of_layers(named):
     """(name, packed array [layer, view, ...]) pairs as (dpr_array[], count): the layers' views are one after the other."""
     return _frames.c_arrays([(name, array.reshape(-1, *array.shape[2:])) for name, array in named])
@@ -172,22 +188,24 @@ class Samples:
         return self.face_id >= 0
 
     def interpolate(self, attributes: Array, faces: Optional[Array] = None) -> Array:
-        """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3]
-        indices of the attributes for the corners of the mesh's faces, where they have some of their own. Raises ValueError
-        for other shapes and indices."""
+        """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3], or
+        [N, F, 3] as those of rasterize(), indices of the attributes for the corners of the mesh's faces, where they have
+        some of their own. Raises ValueError for other shapes and indices."""
         attributes = self._of_my_kind("attributes", attributes)
         rows, least = self._vertices, 0
         if faces is not None:
             faces = _arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.Samples")
             if tuple(faces.shape) != tuple(self._faces.shape):
                 _arrays.fail(ValueError, "faces", list(faces.shape), list(self._faces.shape), "dpr.Samples")
-            rows, least = int(faces.max()) + 1, int(faces.min())
+            rows, least = int(faces.max()) + 1, int((faces.clip(0) if faces.ndim == 3 else faces).min())
         shape, count = tuple(attributes.shape), len(self.face_id)
         is_table = len(shape) == 2 or len(shape) == 3 and shape[0] in (1, count)
         if not is_table or least < 0 or shape[-2] < rows or faces is None and shape[-2] != rows:
             wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
             _arrays.fail(ValueError, "attributes", list(shape), f"[V, C] or [{count}, V, C], V: {wanted}", "dpr.Samples")
-        corners = (self._faces if faces is None else faces)[self.face_id.clip(0)]
+        faces = self._faces if faces is None else faces
+        views = np.arange(count)[:, None, None]
+        corners = faces[views, self.face_id.clip(0)] if faces.ndim == 3 else faces[self.face_id.clip(0)]
         values = attributes[corners] if len(shape) == 2 else \
             attributes[np.arange(len(attributes))[:, None, None, None], corners]
         return (self.barycentrics[..., None] * values).sum(-2)
@@ -277,7 +295,8 @@ def rasterize(spec, plan, copy):
     """Samples of a call's only mesh."""
     count = len(_frames.frames_of(spec.parts))
     if count > 1:
-        _arrays.fail(ValueError, "faces", f"{count} meshes", "one mesh, or N shapes of one topology", "dpr.rasterize")
+        _arrays.fail(ValueError, "faces", f"a list of {count}", "one mesh, N shapes, or meshes padded to [N, F, 3]",
+                     "dpr.rasterize")
     leaves = plan.leaves
     kinds = {_arrays.module_of(leaf) for leaf in leaves}
     if "jax" in kinds:
