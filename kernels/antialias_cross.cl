@@ -18,13 +18,16 @@
 #include "nearest.h"
 #include "visibility.h"
 
+/// A fragment of that ln p or more is not seen through.
+#define DPR_LOG_OPAQUE -5e-7f
+
 /// What hides contours from samples near them: the front-most surface or, where `layers` are told apart, the
-/// last of these, since what lies before it may be seen through. One work-item per DPR_ROWS of a tile of the
-/// band, whose tiles are [get_global_offset(), p.last_tile). Deterministic.
+/// last of these, since what lies before it may be seen through; or, of 0 layers, the first that is opaque. One
+/// work-item per DPR_ROWS of a tile of the band, whose tiles are [get_global_offset(), p.last_tile). Deterministic.
 /// in   tile_starts  uint[view * tile + 1]  runs of contours' pairs
 /// in   starts       uint[pixel + 1]        runs of `list`
 /// in   list         uint[...]              fragments, by pixel
-/// in   depth        float[fragment]        view depth
+/// in   fragments    float[plane][fragment]  DEPTH; with 0 layers, LOG_OCCUPANCY
 /// in   fragment_pair, pair_face            uint[fragment], uint[pair]
 /// out  front        float[pixel]           not written in tiles further than one from a contour. INFINITY
 ///                                          where there are fewer surfaces
@@ -32,7 +35,7 @@
 ///                                          DPR_NO_FACE where there is none
 kernel void antialias_front(const FrameParams p, const uint layers, global const uint* restrict tile_starts,
                             global const uint* restrict starts, global const uint* restrict list,
-                            global const float* restrict depth, global const uint* restrict fragment_pair,
+                            global const float* restrict fragments, global const uint* restrict fragment_pair,
                             global const uint* restrict pair_face, global float* restrict front,
                             global uint* restrict front_face) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
@@ -42,9 +45,12 @@ kernel void antialias_front(const FrameParams p, const uint layers, global const
     for (uint pixel = first; pixel < first + rows.columns; ++pixel) {
       DepthLayer surface = before_surfaces();
       uint face = DPR_NO_FACE;
-      for (uint layer = 0; layer < layers && is_surface(surface); ++layer) {
-        surface = next_behind(surface, pixel, starts, list, depth);
-        if (is_surface(surface)) face = pair_face[fragment_pair[list[surface.place]]];
+      for (uint layer = 0; (layers == 0 || layer < layers) && is_surface(surface); ++layer) {
+        surface = next_behind(surface, pixel, starts, list, fragments + DPR_PLANE(p, DEPTH));
+        if (!is_surface(surface)) break;
+        const uint k = list[surface.place];
+        face = pair_face[fragment_pair[k]];
+        if (layers == 0 && fragments[k + DPR_PLANE(p, LOG_OCCUPANCY)] >= DPR_LOG_OPAQUE) break;
       }
       front[pixel] = surface.depth;
       front_face[pixel] = face;

@@ -50,8 +50,8 @@ struct Mesh {
   std::vector<Material> materials{};            ///< or empty: one that changes nothing
   std::vector<std::uint32_t> face_materials{};  ///< [face] index into materials; empty: all have the first
   /// The probability that a surface is there where it may cover a pixel, from 0 to 1: at most one of the two is
-  /// filled; with neither it is opaque. Below 1 it needs noise of the triangles (Noise::triangle), exact where the
-  /// composition is joint, and frames take longer: nothing is hidden. Images count 0 as 1e-6 (barrier:
+  /// filled; with neither it is opaque. Below 1 sampled aggregation in the joint composition is refused, and
+  /// frames take longer: nothing is hidden. Images count 0 as 1e-6 (barrier:
   /// 1e-20), and where the gradient is asked for 1 as 1 - 1e-6, so that both have theirs. Those of textures multiply
   /// them.
   std::vector<float> vertex_opacities{};  ///< [vertex], or empty

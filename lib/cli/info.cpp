@@ -56,10 +56,7 @@ Json mesh_notes(const Mesh& mesh, const MeshFacts& facts) {
   if (colors_of(mesh) == std::string("none") && mesh.textures.empty()) notes.push_back("no colours: white");
   if (!mesh.face_texcoords.empty() && mesh.textures.empty())
     notes.push_back("texture coordinates without a texture: rendered by --aov uv");
-  if (is_see_through(mesh))
-    notes.push_back(
-        "opacities below 1: for noise of the triangles (--preset joint_gaussian), not for pose, fit and "
-        "track");
+  if (is_see_through(mesh)) notes.push_back("opacities below 1: not for pose, fit and track");
   if (!facts.is_closed()) notes.push_back("not closed: both sides of its triangles are seen");
   if (facts.is_closed() && !facts.is_oriented())
     notes.push_back("triangles wound in opposite senses: no matter to rendering, volumes need one sense");

@@ -22,7 +22,6 @@
 #include "mesh/bounding_box.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
-#include "scene/see_through.hpp"
 #include "smoothing/option_fields.hpp"
 
 namespace dpr::cli {
@@ -74,11 +73,9 @@ Camera fit_camera(const CLI::App& command, const Sphere& sphere, const RenderOpt
 }
 
 /// Smoothing of a picture: edges blurred by a quarter of a pixel. Flags that describe another member of the
-/// family start from the triangles' noise, with as little noise in depth as seams allow. What is seen through
-/// has no noise, which would show every seam.
-Smoothing picture_smoothing(const SmoothingOptions& flags, glm::ivec2 size, bool sees_through) {
+/// family start from the triangles' noise, with as little noise in depth as seams allow.
+Smoothing picture_smoothing(const SmoothingOptions& flags, glm::ivec2 size) {
   constexpr float k_blur_pixels = 0.25F, k_gamma_of_triangles = 1e-3F;
-  if (says_nothing(flags) && sees_through) return smoothing_preset("rigid");
   const float blur = k_blur_pixels * 2 / static_cast<float>(std::min(size.x, size.y));  // NDC
   Smoothing smoothing;
   if (!says_nothing(flags) && flags.noise != Noise::pixel) {
@@ -112,7 +109,7 @@ Scene mesh_scene(const CLI::App& command, const RenderOptions& options, const Co
   const std::string note = noise_note({}, common.smoothing);
   if (!note.empty()) notes.push_back(note);
   const glm::ivec2 size = common.size ? parse_size(*common.size) : glm::ivec2(k_size);
-  scene.smoothing = picture_smoothing(common.smoothing, size, is_see_through(scene));
+  scene.smoothing = picture_smoothing(common.smoothing, size);
   apply(common, scene);
   print_notes(notes, common);
   const Sphere sphere = bounding_sphere(scene.meshes.front().mesh);

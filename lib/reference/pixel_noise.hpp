@@ -1,7 +1,7 @@
 /// Reference for noise on the pixel's position: I = E[R(x + s Z)], x anywhere in the pixel. Double precision,
 /// serial, brute force; no raster.
 ///
-/// R is the rigid image: at a point of the image plane the triangles that cover it, the nearest of them or,
+/// R is the rigid image: at a point of the image plane the triangles that cover it, each over those behind it or,
 /// with gamma, mixed by the noise of the depths. Its convolution with the noise's density and the pixel's
 /// area is an integral over the image plane, taken line by line. Between two neighbouring heights at which
 /// anything begins, ends or crosses, the integral along a line is a smooth function of its height; between
@@ -198,21 +198,27 @@ class PixelNoiseRenderer {
     for (const std::size_t face : faces) {
       const auto fragment = face_fragment(prepared_, face, point);
       if (!fragment) continue;
-      inputs.push_back({fragment->depth, 1.0, 0.0,
+      const Occupancy occupancy =
+          opacity_forward({1.0, 0.0}, opacity_of_face(scene_, prepared_, face), fragment->barycentric);
+      inputs.push_back({fragment->depth, occupancy.p, occupancy.log_p,
                         shade_forward(prepared_.shade, face, fragment->barycentric,
                                       base_of_face(scene_, prepared_, face))});
     }
     if (inputs.empty()) return {0.0, 0.0, 0.0, 0.0};
     Vec3d color;
-    double alpha = 1.0;
+    double alpha = 0.0;
     if (scene_.smoothing.gamma > 0.0) {
       const AggregateResult mixed = aggregate_forward(inputs, prepared_.aggregate);
       color = mixed.color;
       alpha = mixed.silhouette;
     } else {
-      color = std::min_element(inputs.begin(), inputs.end(), [](const auto& a, const auto& b) {
-                return a.depth < b.depth;
-              })->color;
+      std::sort(inputs.begin(), inputs.end(), [](const auto& a, const auto& b) { return a.depth < b.depth; });
+      for (const FragmentInput& input : inputs) {
+        const double share = (1.0 - alpha) * input.p;
+        color += share * input.color;
+        alpha += share;
+      }
+      color += (1.0 - alpha) * scene_.background;
     }
     color += -scene_.background;
     return {color.x, color.y, color.z, alpha};

@@ -49,7 +49,7 @@ void Renderer::Impl::render_aov() {
   if (aov && aov_frame == frame_number) return;
   require_whole();
   if (!aov) aov.emplace(impl_of(device));
-  if (pixel_noise) see_layers(1);
+  if (pixel_noise) see_layers(front_layers());
   for (const Band& band : bands) {
     if (bands.size() > 1) render(band);  // other bands' fragments have replaced its own
     aov->forward(aggregate_inputs(), *geometry, transform, aggregate);

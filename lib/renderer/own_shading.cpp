@@ -59,6 +59,9 @@ void Renderer::Impl::require_samples(const char* caller) {
   if (!pixel_noise)
     throw InvalidArgument(std::string("noise (") + caller + ")", "that of the triangles",
                           "noise on the pixel, as the preset \"pixel\" has it");
+  if (is_see_through)
+    throw InvalidArgument(std::string("opacities (") + caller + ")", "some below 1",
+                          "opaque meshes, and several layers that are blended: the shading is the caller's");
   if (scene.lights || geometry_colors)
     throw InvalidArgument(std::string("lights (") + caller + ")",
                           scene.lights ? "a scene with lights" : "colours by geometry",

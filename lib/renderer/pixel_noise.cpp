@@ -204,8 +204,9 @@ void Renderer::Impl::find_edges() {
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();
   const bool has_shapes = frame.position_stride != 0;
-  const bool may_hide = pixel_noise && layers == 1 && (!has_shapes || clip_planes.knows_views()) &&
-                        !has_device_poses && scene.cull == Cull::none;
+  const bool may_hide = pixel_noise && layers == 1 && !sees_through() &&
+                        (!has_shapes || clip_planes.knows_views()) && !has_device_poses &&
+                        scene.cull == Cull::none;
   const auto hides_none = [](float orientation) { return orientation == 0; };
   if (!may_hide && uploaded_hidden_.size() == count && std::ranges::all_of(uploaded_hidden_, hides_none)) {
     hides_by_device_ = false;

@@ -61,7 +61,6 @@ void Renderer::Impl::forward(FrameSizes sizes) {
   transform.forward(frame, device_views, *geometry, shade.lit());
   if (geometry_colors) geometry_colors->forward(frame, *geometry, transform, geometry->view_colors);
   find_edges();
-  hide_back_faces();
   set_up();
   capacity.reset();
   const FrameNote note = sizes == FrameSizes::kept ? learn() : FrameNote();
@@ -88,6 +87,7 @@ void Renderer::Impl::build_pyramids() {
 void Renderer::Impl::set_up() {
   opacity.set_params(scene.smoothing, follows_opacities_ || wants_opacities(),
                      geometry->textures.has_opacities());
+  hide_back_faces();
   frame.has_base = shade.lit() && !geometry->textures.empty() ? 1 : 0;
   frame.clips = has_device_poses || clip_planes.may_be_crossed(scene, views) ? 1 : 0;
   if (pixel_noise) {
@@ -149,7 +149,7 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
   pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
-  seen_layers_ = 1;
+  seen_layers_ = front_layers();
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {
@@ -252,7 +252,7 @@ void Renderer::Impl::shade_and_aggregate() {
   if (sees_through()) opacity.forward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
   aggregate.forward(aggregate_inputs(), scene.background);
   if (!pixel_noise) return;
-  pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour);
+  pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
   pixel_noise->unblend();
 }
 
@@ -301,7 +301,7 @@ void Renderer::Impl::enqueue_backward(const BufferRef<cl_float4>& grad_images,
     if (pixel_noise->lacks_image(wanted.smoothing)) render_again();
   } else if (pixel_noise) {
     if (pixel_noise->lacks_raster(wanted.smoothing)) render_again();
-    see_layers(1);
+    see_layers(front_layers());
     pixel_noise->backward(contour_inputs(), aggregate.image, image_size(), grad_images, wanted.smoothing,
                           bands.size() == 1, aggregate.scratch(frame));
   }

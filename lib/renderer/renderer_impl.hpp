@@ -291,6 +291,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   SceneGradient finish_geometric_gradient();
   void see_layers(cl_uint count);
+  /// For Antialias::find_front() of the library's own shading.
+  cl_uint front_layers() const { return sees_through() ? 0 : 1; }
   void upload_directions(std::span<const SceneTangent> directions);
   void gather_mesh_gradients(const AddToGradient& add_to_positions);
   void sum_gradients();
@@ -303,7 +305,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   std::size_t found_emptied_ = 0;
   bool follows_opacities_ = false;  // while a frame is rendered again for tangents along them
-  cl_uint seen_layers_ = 1;         // through which the last frame's contours are seen
+  cl_uint seen_layers_ = 1;         // through which the last frame's contours are seen: see find_front()
   Buffer<float> own_samples_, own_pixels_, own_tangents_;  // of the caller's shading, packed
   Buffer<cl_float4> own_group_, own_image_, grad_group_;   // four of their channels
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()

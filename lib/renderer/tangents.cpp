@@ -234,7 +234,7 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
   tangents.images.resize(impl_of(device), directions.size() * image().size());
   cut_for_tangents(tangents_together(directions.size()));
-  if (pixel_noise) see_layers(1);
+  if (pixel_noise) see_layers(front_layers());
   move_in_groups(directions, [&](std::size_t first, std::size_t count) {
     if (pixel_noise) tangents.rasters.resize(impl_of(device), count * samples);
     if (geometry_colors) geometry_colors->tangent(frame, *geometry, transform, tangents);

@@ -334,7 +334,6 @@ Scene parse_scene(const std::filesystem::path& file, std::string_view text, Note
   if (!note.empty()) notes.push_back(note);
   with_keys_of(file, smoothing, overrides.smoothing, [&] {
     SmoothingOptions all = overlay(smoothing, overrides.smoothing);
-    if (says_nothing(all) && is_see_through(scene)) all.preset = "joint_gaussian";
     scene.smoothing = resolve_smoothing(all, scene.width, scene.height);
     validate(scene);
   });

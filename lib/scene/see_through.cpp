@@ -13,12 +13,6 @@ void require_opaque(const Scene& scene, const std::string& where) {
 }
 
 void require_sees_through(const Smoothing& smoothing) {
-  if (smoothing.noise == Noise::pixel) {
-    throw InvalidArgument("noise (smoothing)", "pixel with opacities below 1 or their gradient",
-                          "that of triangles in the joint composition: the preset joint_gaussian, or rigid; "
-                          "or, from a program, the "
-                          "samples of several layers, blended by it, and Renderer::resolve()");
-  }
   if (smoothing.composition == Composition::joint &&
       smoothing.aggregation_estimator == Estimator::monte_carlo) {
     throw InvalidArgument("aggregation_estimator (smoothing)",

@@ -12,8 +12,7 @@ bool is_see_through(const Scene& scene);
 /// Throws InvalidArgument for such a scene; `where` says what needs an opaque one.
 void require_opaque(const Scene& scene, const std::string& where);
 
-/// Throws InvalidArgument for noise on the pixel, whose contours end behind the nearest surface, and for the sampled
-/// joint composition.
+/// Throws InvalidArgument for the sampled joint composition.
 void require_sees_through(const Smoothing& smoothing);
 
 }  // namespace dpr

@@ -35,7 +35,7 @@ void Antialias::find_front(const shared::FrameParams& p, const Bin& bin, const R
                                   .tile_starts = contour.tile_starts,
                                   .starts = rasterize.pixel_starts,
                                   .list = rasterize.list,
-                                  .depth = rasterize.values,
+                                  .fragments = rasterize.values,
                                   .fragment_pair = rasterize.fragment_pair,
                                   .pair_face = bin.pair_face,
                                   .front = front,

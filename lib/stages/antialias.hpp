@@ -37,7 +37,7 @@ class Antialias {
   /// The depths behind which the samples near contours of the rasterizer's band show none: those of the
   /// front-most surfaces, or of the last of so many `layers`.
   void find_front(const shared::FrameParams& p, const Bin& bin, const Rasterize& rasterize,
-                  const Contour& contour, cl_uint layers = 1);
+                  const Contour& contour, cl_uint layers);
   /// Finds what crosses the steps between samples; after find_front() of the window. Surfaces p.depth_reach
   /// (normalised depth) behind the nearest count as seen. `wanted`, here and below: the rows of tiles whose results
   /// are, k_rows_around less than the window where the view goes on; or all of the window.

@@ -349,14 +349,12 @@ TEST_SUITE("opacity") {
       change(changed);
       return changed;
     };
-    refused(with([](Scene& s) { s.smoothing = smoothing_preset("pixel"); }), "joint_gaussian");
     refused(with([](Scene& s) { s.smoothing.aggregation_estimator = Estimator::monte_carlo; }),
             "monte_carlo");
     refused(with([](Scene& s) { s.meshes[1].mesh.vertex_opacities[2] = 1.5F; }), "vertex_opacities[2]");
     refused(with([](Scene& s) { s.meshes[1].mesh.vertex_opacities[2] = NAN; }), "vertex_opacities[2]");
     refused(with([](Scene& s) { s.meshes[1].mesh.vertex_opacities.pop_back(); }), "3 opacities");
     refused(with([](Scene& s) { s.meshes[1].mesh.face_opacities = {1, 1}; }), "at most one");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_smoothing(smoothing_preset("pixel")), "resolve");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_opacities(1, std::vector<float>{1, 1, 1}),
                           "expected 4");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_opacities(1, std::vector<float>{1, 1, 2, 1}),

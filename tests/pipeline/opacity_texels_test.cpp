@@ -244,7 +244,6 @@ TEST_SUITE("opacity") {
     const auto refused = [](const Scene& bad, const char* part) {
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(bad), part);
     };
-    refused(with([](Scene& s, auto&) { s.smoothing = smoothing_preset("pixel"); }), "joint_gaussian");
     refused(with([](Scene&, auto& opacities) { opacities[3] = 1.5F; }), "opacities[3]");
     refused(with([](Scene&, auto& opacities) { opacities[3] = NAN; }), "opacities[3]");
     refused(with([](Scene&, auto& opacities) { opacities.pop_back(); }), "one for each texel");
@@ -263,8 +262,6 @@ TEST_SUITE("opacity") {
                           "opaque mesh");
     const dpr::test::TempDir folder;
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, write_mesh(folder / "a.glb", leafy.meshes[1].mesh), "opaque mesh");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_smoothing(smoothing_preset("pixel")),
-                          "joint_gaussian");
   }
 }
 

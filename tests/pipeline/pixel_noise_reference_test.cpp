@@ -37,6 +37,24 @@ Scene blurred(Scene scene, double pixels, float gamma) {
 
 Scene whole_cube() { return scene_of(welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
+/// In front of a smaller one that is opaque: sides are seen through sides.
+Scene glass_cube(bool is_smooth) {
+  Scene scene = whole_cube();
+  Mesh& glass = scene.meshes[0].mesh;
+  if (is_smooth) {
+    for (std::size_t i = 0; i < glass.positions.size(); ++i)
+      glass.vertex_opacities.push_back(0.3F + 0.05F * static_cast<float>(i));
+  } else {
+    for (std::size_t i = 0; i < glass.faces.size(); ++i)
+      glass.face_opacities.push_back(0.25F + 0.1F * static_cast<float>(i / 2));
+  }
+  Mesh core = welded_cube();
+  std::ranges::fill(core.face_colors, glm::vec3(0.1F, 0.8F, 0.3F));
+  scene.meshes.push_back({core, placed(20, 0.4F)});
+  scene.gradients.opacities = true;
+  return scene;
+}
+
 /// The near plane cuts it open, in sight.
 Scene cut_cube() { return scene_cut_open(welded_cube(), reduced(k_width, 8), reduced(k_height, 6)); }
 
@@ -127,9 +145,30 @@ void add_positions(const SceneGradient& gradient, std::vector<Direction>& list) 
   }
 }
 
+void add_opacities(const Scene& scene, const SceneGradient& gradient, std::vector<Direction>& list) {
+  const std::vector<float>& opacities = gradient.meshes[0].opacities;
+  if (opacities.empty()) return;
+  Random random(9);
+  std::vector<double> direction;
+  double found = 0, squares = 0, size = 0;
+  for (const float g : opacities) {
+    direction.push_back(static_cast<double>(random(-1, 1)));
+    found += direction.back() * static_cast<double>(g);
+    squares += direction.back() * direction.back();
+    size += static_cast<double>(g) * static_cast<double>(g);
+  }
+  const bool is_smooth = !scene.meshes[0].mesh.vertex_opacities.empty();
+  const double scale = std::sqrt(size * squares / static_cast<double>(opacities.size()));
+  list.push_back({"opacities", found, scale, 1e-3, [direction, is_smooth](reference::Scene& s, double t) {
+                    auto& moved = is_smooth ? s.meshes[0].vertex_opacities : s.meshes[0].face_opacities;
+                    for (std::size_t i = 0; i < direction.size(); ++i) moved[i] += t * direction[i];
+                  }});
+}
+
 std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradient) {
   std::vector<Direction> list;
   add_positions(gradient, list);
+  add_opacities(scene, gradient, list);
   const PoseGradient& model = gradient.views[0].transforms[0];
   const CameraGradient& camera = gradient.views[0].camera;
   for (int i = 0; i < 3; ++i) {
@@ -164,7 +203,8 @@ constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0
 
 double tolerance_of(const Direction& d, const Tolerance& t) {
   const double width = reduced(k_width, 8);
-  return (d.name == "sigma" || d.name == "background" ? t.others : t.geometry) / (width * width);
+  const bool is_of_geometry = d.name != "sigma" && d.name != "background" && d.name != "opacities";
+  return (is_of_geometry ? t.geometry : t.others) / (width * width);
 }
 
 /// At the reduced size the blur is as wide as the corners that the near plane cuts off.
@@ -223,6 +263,22 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("pixel noise: surfaces are seen through as the reference has it, opaque ones behind them too") {
+    for (const bool is_smooth : {false, true}) {
+      for (const float gamma : {1e-8F, 3e-2F}) {
+        const Scene scene = blurred(glass_cube(is_smooth), 2, gamma);
+        Renderer renderer(open_device());
+        renderer.set_scene(scene);
+        renderer.forward();
+        const reference::Scene twin = twin_of(scene, gamma < 1e-6F);
+        CAPTURE(gamma);
+        const double error = largest_difference(renderer.image(), reference::render_pixel_noise(twin));
+        MESSAGE("error: " << error);
+        CHECK(error < 2e-3);
+      }
+    }
+  }
+
   TEST_CASE("pixel noise: the image of what the near plane cuts is the reference's") {
     const auto check = [](const Scene& of, double tolerance) {
       const Scene scene = blurred(of, 2, 1e-8F);
@@ -246,6 +302,11 @@ TEST_SUITE("gradient") {
       CAPTURE(has_creases);
       check_gradients(scene, has_creases ? k_creases : k_silhouette);
     }
+  }
+
+  TEST_CASE("pixel noise: gradients of what is seen through against differences of the reference") {
+    for (const bool is_smooth : {false, true})
+      check_gradients(blurred(glass_cube(is_smooth), 2, 1e-8F), k_creases);
   }
 
   TEST_CASE("pixel noise: gradients of what the near plane cuts against differences of the reference") {

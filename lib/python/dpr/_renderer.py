@@ -113,8 +113,8 @@ class Renderer:
                      k4; [N, 1], orthographic: world units from the lower to the upper edge
         colors       [V, 3] or [N, V, 3], linear RGB of the vertices; or
         face_colors  [F, 3] or [N, F, 3], of the faces; white without either
-        opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1 they need
-                     noise of the triangles (the preset "joint_gaussian" say), and outputs with gradients are refused
+        opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1
+                     outputs with gradients are refused, and so is dpr.rasterize()
         texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
         face_texcoords  [F, 3], int64 or int32: their indices
         textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by
@@ -227,7 +227,7 @@ class Renderer:
                   copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
-        The arguments are those of a call, of one mesh or N shapes of it; of NumPy, PyTorch, or any library with DLPack but JAX.
+        The arguments are those of a call, of one mesh, N shapes, or N padded meshes; of NumPy, PyTorch, or DLPack but JAX.
         layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
@@ -247,8 +247,8 @@ class Renderer:
             _library.warn(samples._rasterized.warning)
         return samples
 
-    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False, as_one=False):
-        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one)
+    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):
+        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one=True)
         spec = spec._replace(settings=(*spec.settings, _plan.setting("layers", layers)))
         return _samples.rasterize(spec, plan, copy)
 
