@@ -37,6 +37,7 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
                             *const depth = fragments + DPR_PLANE(p, DEPTH),
                             *const bary = fragments + DPR_PLANE(p, BARY);
   global const float4* vertices = world + pixel / pixels_per_view * p.vertices;
+  faces += first_row(p, pixel / pixels_per_view);
   float sum = 0.0f, squares = 0.0f, depth_sum = 0.0f,
         largest = channels[DPR_CHANNEL_BACKGROUND * pixels + pixel];
   float2 barycentrics = (float2)(0.0f, 0.0f);
@@ -49,7 +50,7 @@ kernel void auxiliary_forward(const FrameParams p, const uint last_pixel, global
     sum += w;
     squares += w * w;
     depth_sum += w * depth[k];
-    normal += w * normalized(face_normal(vertices, faces[first_row(p, pixel / pixels_per_view) + face]));
+    normal += w * normalized(face_normal(vertices, faces[face]));
     if (w <= largest) continue;
     largest = w;
     seen = face;

@@ -153,6 +153,15 @@ void Run::print() const {
   }
   std::printf("%s: %zu frames: %zu searched for and found, %zu followed, %zu lost\n", options_.output.c_str(),
               rows_.size(), found, rows_.size() - found - lost, lost);
+  if (lost > 0) {
+    const bool is_robust = options_.tracker.method.robust || options_.tracker.method.unknown_background;
+    std::printf(
+        "No pose explains a lost frame. %s--explained %g, twice as much, lets more of the object be "
+        "hidden.\n",
+        is_robust ? ""
+                  : "--robust bears what the scene lacks, --unknown-background what is behind the object; ",
+        2 * static_cast<double>(options_.tracker.explained));
+  }
   if (rows_.size() < 2) return;
   const auto others = static_cast<double>(rows_.size() - 1);
   std::printf("The first frame took %.2f s; then %.1f frames a second, %.1f with reading them.\n",

@@ -214,7 +214,7 @@ class PixelNoiseRenderer {
     } else {
       std::sort(inputs.begin(), inputs.end(), [](const auto& a, const auto& b) { return a.depth < b.depth; });
       for (const FragmentInput& input : inputs) {
-        const double share = (1.0 - alpha) * input.p;
+        const double share = (1.0 - alpha) * input.occupancy;
         color += share * input.color;
         alpha += share;
       }

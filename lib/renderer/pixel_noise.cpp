@@ -187,8 +187,8 @@ std::size_t PixelNoise::bytes() const {
 
 void Renderer::Impl::find_edges() {
   if (!pixel_noise) return;
-  if (!pixel_noise->edges) {
-    pixel_noise->edges.emplace(impl_of(device), scene, geometry->views_of_faces);
+  if (!pixel_noise->edges || pixel_noise->edges->sees_through != is_see_through) {
+    pixel_noise->edges.emplace(impl_of(device), scene, geometry->views_of_faces, is_see_through);
     pixel_noise->back_faces = BackFaces(std::move(pixel_noise->edges->solids));
     setup.forget_volumes();
     for (std::size_t mesh = 0; mesh < scene.meshes.size(); ++mesh) {

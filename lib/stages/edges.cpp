@@ -59,6 +59,10 @@ bool light_may_jump(const Mesh& mesh, const WeldedEdge& edge) {
 struct SeenFaces {
   const Mesh& mesh;
   std::size_t first_row, faces, first_face;
+  bool sees_through;
+
+  /// True if the opacities of neighbours may differ.
+  bool fades() const { return sees_through && !mesh.face_opacities.empty(); }
 };
 
 /// With the mesh's rows for the faces seen.
@@ -79,7 +83,7 @@ cl_uint2 row_of(const SeenFaces& seen, const WeldedEdge& of_seen) {
   if (!edge.other) return row;
   row.s[1] = (to_uint(seen.first_face) + *of_seen.other) | (edge.same_direction ? DPR_EDGE_FLAG : 0);
   if (mesh.vertex_colors.empty() && !mesh.face_colors.empty()) row.s[0] |= DPR_EDGE_FLAG;
-  if (is_seam(mesh, edge)) row.s[0] |= DPR_EDGE_SEAM;
+  if (is_seam(mesh, edge) || seen.fades()) row.s[0] |= DPR_EDGE_SEAM;
   if (light_may_jump(mesh, edge)) row.s[1] |= DPR_EDGE_SEAM;
   return row;
 }
@@ -91,6 +95,10 @@ shared::OpenEdge open_edge(const SeenFaces& seen, const WeldedEdge& of_seen) {
   open.side = side_of(of_seen, seen.first_face);
   open.texture = mesh.textures.empty() ? k_no_texture : texture_of(mesh, edge.face);
   open.material = to_uint(material_of(mesh, edge.face));
+  if (seen.fades()) {
+    open.texture = edge.face;  // another than any other face's: at all these edges it jumps
+    return open;
+  }
   if (open.texture == k_no_texture) return open;
   const float period = period_of(mesh.textures[open.texture].wrap);
   const auto place = [&](std::uint32_t corner) {
@@ -159,8 +167,8 @@ void append(std::vector<Element>& all, std::vector<Element>&& more) {
 
 }  // namespace
 
-Edges::Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces)
-    : device_(device), launch_(device) {
+Edges::Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces, bool is_see_through)
+    : sees_through(is_see_through), device_(device), launch_(device) {
   constexpr std::size_t k_most = std::min(DPR_EDGE_SEAM / 3, DPR_NO_MESH_EDGE / (3 * DPR_FACE_SIDES));
   std::vector<SeenEdges> all(views_of_faces);
   for (std::size_t view = 0; view < views_of_faces; ++view) {
@@ -172,7 +180,7 @@ Edges::Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_face
         throw InvalidArgument("faces (scene)", "more than " + std::to_string(k_most),
                               "at most that many with noise of the pixel");
       }
-      solids.push_back(add_edges({mesh, view * faces, faces, first_face}, all[view]));
+      solids.push_back(add_edges({mesh, view * faces, faces, first_face, sees_through}, all[view]));
       first_face += faces;
     }
     count = std::max(count, all[view].rows.size());

@@ -12,13 +12,15 @@ namespace dpr {
 class Edges {
  public:
   /// By the vertices that faces share. Throws InvalidArgument for more faces than can be numbered.
-  /// `views_of_faces`: see Geometry.
-  Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces = 1);
+  /// `views_of_faces`: see Geometry. `is_see_through`: edges between faces with opacities are those of a seam.
+  Edges(Device::Impl& device, const Scene& scene, std::size_t views_of_faces = 1,
+        bool is_see_through = false);
 
   /// Joins those that coincide where vertices lie now. To be called before edges are read, after positions
   /// have changed, or p.position_stride or, where that is set, p.views. Does not wait for the device.
   void join(const shared::FrameParams& p, const Geometry& geometry);
 
+  bool sees_through;
   std::size_t count = 0;       ///< of a view
   std::vector<Solid> solids;   ///< [mesh] of each view of faces, for the first who wants them
   Buffer<cl_uint2> edges;      ///< [edge] see DPR_EDGE_FLAG; [view][edge] where p.position_stride is set

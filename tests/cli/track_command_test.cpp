@@ -262,8 +262,9 @@ TEST_SUITE("pipeline") {
     const TempDir folder;
     write_inputs(folder);
     dpr::write_image(folder / frame_name(k_first + 2), dpr::Image(64, 48, glm::vec4(0.3F, 0.3F, 0.3F, 1)));
-    REQUIRE(track(folder, "--sequence frames --rotations 64 -o track.json --csv track.csv --quiet").status ==
-            0);
+    const auto outcome = track(folder, "--sequence frames --rotations 64 -o track.json --csv track.csv");
+    REQUIRE(outcome.status == 0);
+    CHECK(contains(outcome.out, "1 lost\nNo pose explains a lost frame. --robust"));
     const std::vector<std::string> rows = lines(folder.read("track.csv"));
     REQUIRE(rows.size() == 1 + k_frames);
     check_row(rows[2], k_first + 1);

@@ -157,15 +157,17 @@ TEST_SUITE("opacity") {
   }
 
   TEST_CASE("opacity: <u, J v> = <J^T u, v>, and differences") {
-    for (const Composition composition : {Composition::joint, Composition::barrier}) {
+    for (const auto& [composition, is_of_pixel] :
+         {std::pair(Composition::joint, false), {Composition::barrier, false}, {Composition::joint, true}}) {
       Renderer renderer(open_device());
       Scene scene = lit(sheet_and_sphere(composition));
+      if (is_of_pixel) scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
       renderer.set_scene(scene);
       renderer.forward();
       Random random(7);
       const std::vector<Image> weights = random_images(renderer, random);
       SceneGradient gradient = renderer.backward(weights);
-      const std::vector<Way> ways = random_ways(gradient, /*by_sigma*/ true, random);
+      const std::vector<Way> ways = random_ways(gradient, /*by_sigma*/ !is_of_pixel, random);
       const std::vector<double> errors = errors_of(renderer, weights, ways);
       bool has_opacities = false;
       for (std::size_t k = 0; k < ways.size(); ++k) {
@@ -271,6 +273,52 @@ TEST_SUITE("opacity") {
     }
   }
 
+  TEST_CASE(
+      "opacity: set anew with noise on the pixel, an image does not depend on what was rendered before") {
+    for (const bool is_of_faces : {false, true}) {
+      Scene scene = sheet_and_sphere(Composition::joint);
+      scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);
+      if (is_of_faces) {
+        scene.meshes[1].mesh.vertex_opacities.clear();
+        scene.meshes[1].mesh.face_opacities = {0.3F, 0.8F};
+      }
+      std::vector<Image> images;
+      const Image grad = random_image(scene.width, scene.height, -1, 1);
+      std::vector<SceneGradient> gradients;
+      for (const bool is_anew : {false, true}) {
+        Renderer renderer(open_device());
+        Scene first = scene;
+        if (is_anew) {
+          for (Instance& instance : first.meshes) {
+            std::ranges::fill(instance.mesh.vertex_opacities, 1.0F);
+            std::ranges::fill(instance.mesh.face_opacities, 1.0F);
+          }
+          first.gradients.opacities = false;
+        }
+        renderer.set_scene(first);
+        renderer.forward();
+        if (is_anew) {
+          CHECK(largest_difference(renderer.image(), images[0]) > 0.05);
+          renderer.set_gradients(scene.gradients);
+          for (std::size_t m = 0; m < 2; ++m) {
+            const Mesh& mesh = scene.meshes[m].mesh;
+            renderer.set_opacities(
+                m, mesh.vertex_opacities.empty() ? mesh.face_opacities : mesh.vertex_opacities);
+          }
+          renderer.forward();
+        }
+        images.push_back(renderer.image());
+        gradients.push_back(renderer.backward(std::span(&grad, 1)));
+      }
+      CHECK(images[0].pixels == images[1].pixels);
+      for (std::size_t m = 0; m < 2; ++m) {
+        CHECK(gradients[0].meshes[m].opacities == gradients[1].meshes[m].opacities);
+        CHECK(gradients[0].meshes[m].positions == gradients[1].meshes[m].positions);
+        CHECK(std::ranges::any_of(gradients[0].meshes[m].opacities, [](float g) { return g != 0; }));
+      }
+    }
+  }
+
   TEST_CASE("opacity: set anew, of instances, on several devices, in batches, and by scene files") {
     Scene scene = sheet_and_sphere(Composition::joint);
     scene.meshes.push_back({{}, placed(60.0F, 0.5F, {-0.6F, 0.9F, 1.2F}), 1});
@@ -369,18 +417,19 @@ TEST_SUITE("opacity") {
     // Opaque scenes go with every smoothing, but not the gradient.
     Scene opaque = with([](Scene& s) {
       s.smoothing = smoothing_preset("pixel");
+      s.smoothing.aggregation_estimator = Estimator::monte_carlo;
       s.meshes[0].mesh.face_opacities.clear();
       s.meshes[1].mesh.vertex_opacities.assign(4, 1.0F);
     });
     renderer.set_scene(opaque);
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.forward(), "pixel");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.forward(), "monte_carlo");
     renderer.set_gradients({});
     renderer.forward();
     const Image grad = renderer.image();
     renderer.set_gradients(with_opacities());
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.backward(std::span(&grad, 1)), "pixel");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.backward(std::span(&grad, 1)), "monte_carlo");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_opacities(1, std::vector<float>{1, 1, 0.5F, 1}),
-                          "pixel");
+                          "monte_carlo");
     renderer.set_opacities(1, std::vector<float>(4, 1.0F));
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.set_opacities(0, std::vector<float>{1}),
                           "without opacities");

@@ -44,7 +44,8 @@ Scene glass_cube(bool is_smooth) {
   if (is_smooth) {
     for (std::size_t i = 0; i < glass.positions.size(); ++i)
       glass.vertex_opacities.push_back(0.3F + 0.05F * static_cast<float>(i));
-  } else {
+  } else {  // the sides are told apart by their opacities alone
+    std::ranges::fill(glass.face_colors, glass.face_colors[0]);
     for (std::size_t i = 0; i < glass.faces.size(); ++i)
       glass.face_opacities.push_back(0.25F + 0.1F * static_cast<float>(i / 2));
   }
@@ -195,11 +196,13 @@ std::vector<Direction> directions(const Scene& scene, const SceneGradient& gradi
 
 /// Contours that meet take colours of the samples around with an error of second order in the samples'
 /// distance: a share of the geometry's gradients that falls as the resolution grows, more where corners are
-/// sharp, and most where the near plane cuts surfaces open that hide parts of each other.
+/// sharp, and most where the near plane cuts surfaces open that hide parts of each other. Contours that are seen
+/// through others cross them, with an error of first order.
 struct Tolerance {
   double geometry, others;  // times the squared width
 };
-constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0.4}, k_cut{16, 0.4};
+constexpr Tolerance k_silhouette{0.4, 0.4}, k_triangle{1.6, 0.4}, k_creases{2, 0.4}, k_cut{16, 0.4},
+    k_glass{16, 1};
 
 double tolerance_of(const Direction& d, const Tolerance& t) {
   const double width = reduced(k_width, 8);
@@ -273,8 +276,7 @@ TEST_SUITE("pipeline") {
         const reference::Scene twin = twin_of(scene, gamma < 1e-6F);
         CAPTURE(gamma);
         const double error = largest_difference(renderer.image(), reference::render_pixel_noise(twin));
-        MESSAGE("error: " << error);
-        CHECK(error < 2e-3);
+        CHECK(error < 4e-4);
       }
     }
   }
@@ -306,7 +308,7 @@ TEST_SUITE("gradient") {
 
   TEST_CASE("pixel noise: gradients of what is seen through against differences of the reference") {
     for (const bool is_smooth : {false, true})
-      check_gradients(blurred(glass_cube(is_smooth), 2, 1e-8F), k_creases);
+      check_gradients(blurred(glass_cube(is_smooth), 2, 1e-8F), at_cuts(k_glass));
   }
 
   TEST_CASE("pixel noise: gradients of what the near plane cuts against differences of the reference") {
