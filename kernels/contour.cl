@@ -195,8 +195,7 @@ static inline int is_long(const FrameParams p, const Contours c, uint edge) {
 
 /// The edge of a face between two of its vertices.
 static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
-  const uint last = 2 * c.corner_starts[a + 1];
-  for (uint k = 2 * c.corner_starts[a]; k < last; ++k) {
+  for (uint k = 2 * c.corner_starts[a]; k < 2 * c.corner_starts[a + 1]; ++k) {
     const uint edge = edge_at(c.face_edges, c.corners[k / 2], k % 2);
     if (edge == DPR_NO_MESH_EDGE) continue;
     const uint4 record = record_of(c.edges.edges[edge], c.edges.faces);
@@ -208,8 +207,7 @@ static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
 
 /// True if all contours that end in a vertex are that long.
 static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
-  const uint last = 2 * c.corner_starts[vertex + 1];
-  for (uint k = 2 * c.corner_starts[vertex]; k < last; ++k) {
+  for (uint k = 2 * c.corner_starts[vertex]; k < 2 * c.corner_starts[vertex + 1]; ++k) {
     const uint edge = edge_at(c.face_edges, c.corners[k / 2], k % 2);
     if (edge != DPR_NO_MESH_EDGE && !is_long(p, c, edge)) return 0;
   }
@@ -237,8 +235,7 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
 /// there are none. Inputs as contour_count, and
 /// in   capacity    places that there are
 /// in   face_edges  uint[face]             see DPR_FACE_SIDES
-/// in   corner_starts  uint[vertex + 1]    runs of `corners`
-/// in   corners     uint[corner]           face * 3 + corner, by vertex
+/// in   corner_starts, corners  as normals_forward (normals.cl)
 /// in   kinds       uchar[view][edge]      as contour_count leaves them
 /// in   offsets     uint[view * edge + 1]  exclusive scan of the counts
 /// out  pairs       uint[1]      how many there are; 0 where they do not fit
@@ -286,8 +283,7 @@ kernel void contour_fill(const FrameParams p, const uint capacity, global const 
 /// in      edges         uint2[edge]            of the scene; see DPR_EDGE_FLAG
 /// in      faces         uint4[face]            vertex indices
 /// in      face_edges    uint[face]             see DPR_FACE_SIDES
-/// in      corner_starts uint[vertex + 1]       runs of `corners`
-/// in      corners       uint[corner]           face * 3 + corner, by vertex
+/// in      corner_starts, corners               as normals_forward (normals.cl)
 /// in      grad_ends     float4[pair]           of x, y of the first end, x, y of the second, NDC
 /// in out  grad_ndc      float4[view][vertex]
 kernel void contour_gather(const FrameParams p, global const uint* restrict pairs,

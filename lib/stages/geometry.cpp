@@ -215,7 +215,9 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<
   color_values.upload(device, all_colors);
   if (by_vertex) return;
   color_faces = all_faces.size() - rows();
-  color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors);
+  const bool are_by_view = has_own_faces() && !scene.meshes[0].mesh.vertex_colors.empty();
+  color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors,
+                                  are_by_view ? views_of_faces : 1);
 }
 
 /// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.

@@ -95,9 +95,10 @@ struct Geometry {
   Buffer<cl_float4> positions;       ///< [position] object space
   Buffer<shared::MeshPlace> places;  ///< [mesh]
   Buffer<cl_uint> vertex_mesh;       ///< [vertex]
-  /// [row], faces of one view after the other, vertex indices; w = mesh. Then, where they are others, and each from its place on: indices of the
-  /// corners' colours, w = material; of their texture coordinates, w = texture or DPR_NO_TEXTURE; of their
-  /// normals: a vertex, or the number of vertices + a given one; of their opacities.
+  /// [row], the faces, of views with faces of their own view after view: vertex indices; w = mesh. Then, where they are
+  /// others, and each from its place on: indices of the corners' colours, w = material; of their texture coordinates,
+  /// w = texture or DPR_NO_TEXTURE; of their normals: a vertex, or the number of vertices + a given one; of their
+  /// opacities.
   Buffer<cl_uint4> face_vertices;
   std::size_t color_faces = 0, texcoord_faces = 0, normal_faces = 0, opacity_faces = 0;
   Buffer<cl_float4> color_values;                 ///< [color]

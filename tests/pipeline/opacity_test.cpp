@@ -275,6 +275,7 @@ TEST_SUITE("opacity") {
 
   TEST_CASE(
       "opacity: set anew with noise on the pixel, an image does not depend on what was rendered before") {
+    if (dpr::test::is_reduced()) return;  // nothing is launched that other cases do not launch
     for (const bool is_of_faces : {false, true}) {
       Scene scene = sheet_and_sphere(Composition::joint);
       scene.smoothing = smoothing_preset("pixel", scene.width, scene.height);

@@ -72,6 +72,8 @@ VARIANTS = {
     "colours of faces": {"face_colors": of_each(lambda v, f: (len(f), 3))},
     "flat light": {"lights": LIGHTS, "shading": "flat", "colors": of_each(lambda v, f: (len(v), 3))},
     "smooth light": {"lights": LIGHTS, "shading": "phong", "face_colors": of_each(lambda v, f: (len(f), 3))},
+    "materials and colours": {"lights": LIGHTS, "shading": "blinn", "colors": of_each(lambda v, f: (len(v), 3)),
+                              **{name: textured()[name] for name in ("materials", "face_materials")}},
     "textures": textured(),
     "textures in the light": {"lights": LIGHTS, "shading": "gouraud", **textured()},
     "near the camera": {"colors": of_each(lambda v, f: (len(v), 3)), "znear": 2.3, "zfar": 3.5},
