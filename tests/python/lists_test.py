@@ -134,7 +134,7 @@ class ListsTest(unittest.TestCase):
     def test_outputs(self):
         outputs = ["face_id", "barycentrics", "effective_faces"]
         for noise in NOISES:
-            (_, found, _, count), (_, expected, _, _) = (rendered({}, noise, is_merged, outputs) for is_merged in (True, False))
+            (_, found, _, count), (_, expected, _, _) = (rendered({}, noise, merged, outputs) for merged in (True, False))
             self.assertEqual(count, 1)
             np.testing.assert_array_equal(found["face_id"], expected["face_id"])
             for name in outputs[1:]:
@@ -165,6 +165,32 @@ class ListsTest(unittest.TestCase):
         self.assertEqual(groups([4, 6, 5]), [[0, 1, 2]])
         self.assertEqual(groups([4, 4000, 5, 3000]), [[0, 2], [1, 3]])
         self.assertEqual(groups([4, 6], estimator="monte_carlo"), [[0], [1]])
+
+    def test_what_is_wrong_with_one_mesh(self):
+        """Indices and sizes that the arrays of another mesh would bear."""
+        given = textured()
+        small, large = 3, 2  # meshes by their size
+        cases = {"faces": ("faces", np.where(FACES[small] == 0, len(VERTICES[small]), FACES[small])),
+                 "colors": ("colors", random(len(VERTICES[small]) + 1, 3)), "few colors": ("colors", random(3, 3)),
+                 "texcoords": ("texcoords", random(len(VERTICES[small]) - 1, 2)),
+                 "face_textures": ("face_textures", np.ones(len(FACES[small]), np.int64)),
+                 "face_materials": ("face_materials", np.full(len(FACES[small]), 2)),
+                 "face_texcoords": ("face_texcoords", np.full((len(FACES[small]), 3), len(VERTICES[small])))}
+        for name, (array, wrong) in cases.items():
+            meshes = {"faces": list(FACES), **{key: list(given[key]) for key in given if key not in ("filter", "colors")}}
+            meshes["colors"] = list(VARIANTS["colours of vertices"]["colors"])
+            meshes["face_texcoords"][small] = FACES[small]
+            renderer = dpr.Renderer(SIZE, SIZE)
+            order = [large, small]
+
+            def render():
+                renderer(vertices=[VERTICES[i] for i in order], views=VIEWS[:2], intrinsics=LENS,
+                         **{key: [of_all[i] for i in order] for key, of_all in meshes.items()})
+
+            render()
+            meshes[array][small] = wrong
+            with self.subTest(name), self.assertRaisesRegex(ValueError, "view 1"):
+                render()
 
     def test_refused(self):
         spec = dpr.Renderer(SIZE, SIZE)._spec()

@@ -195,6 +195,7 @@ class Frames:
         return None if any(own is None for own in found) else found
 
     def antialias(self, color, vertices, boost):
-        found = [part.frame.antialias(color if len(part.images) == len(color) else color.index_select(0, torch.tensor(part.images)), own, boost)
-                 for part, own in zip(self._parts, vertices)]
+        colors = [color if len(part.images) == len(color) else color.index_select(0, torch.tensor(part.images))
+                  for part in self._parts]
+        found = [part.frame.antialias(*given, boost) for part, *given in zip(self._parts, colors, vertices)]
         return self._in_order(found, color)

@@ -29,15 +29,35 @@ def _split(settings):
     return {name: words.split(",") for name, words in (text.split("=") for text in settings)}
 
 
+def _is_regular(mesh):
+    """True if arrays are of the sizes that a frame takes, and indices within them: beside others nothing would tell."""
+    vertices, faces = mesh["vertices"].size // 3, mesh["faces"].size // 3
+    texcoords, textures, materials = mesh.get("texcoords"), _texture_count(mesh), _material_count(mesh)
+    by_index = "face_texcoords" in mesh
+    sizes = {"colors": 3 * vertices, "face_colors": 3 * faces, "face_texcoords": 3 * faces, "face_textures": faces,
+             "face_materials": faces, "materials.specular": 3 * materials, "materials.shininess": materials}
+    bounds = {"faces": vertices, "face_texcoords": 0 if texcoords is None else texcoords.size // 2,
+              "face_textures": textures, "face_materials": materials}
+    least = {"face_textures": -1}
+    return ((texcoords is not None) == (textures > 0)
+            and (texcoords is None or texcoords.shape in (((vertices, 2), (faces, 3, 2)) if not by_index else
+                                                          ((texcoords.size // 2, 2),)))
+            and all(mesh[name].size == size for name, size in sizes.items() if name in mesh)
+            and all(mesh[name].max() < bound and mesh[name].min() >= least.get(name, 0)
+                    for name, bound in bounds.items() if name in mesh))
+
+
 def _kind(settings, parts, arrays):
-    """What frames must have in common to be one; None of one that stays alone."""
-    names = {part.name for part in parts}
-    textures = {name for name in names if name.startswith("textures[")}
-    if "faces" not in names or not names - textures <= _KNOWN | {name for name in names if name.startswith("lights.")} or \
-            any(part.name in textures and arrays[part.leaf].shape[-1] == 4 for part in parts):
+    """What frames must have in common to be one; None of one that stays alone, and of one that is to be refused by itself."""
+    mesh = {part.name: part.of(arrays[part.leaf]) for part in parts}
+    textures = {name for name in mesh if name.startswith("textures[")}
+    lights = {name for name in mesh if name.startswith("lights.")}
+    if "faces" not in mesh or not mesh.keys() - textures - lights <= _KNOWN or \
+            any(mesh[name].shape[-1] != 3 for name in textures) or not _is_regular(mesh):
         return None
-    fixed = names - textures - {"face_texcoords", "face_textures", "face_materials"}
-    return frozenset(_split(settings)), bool(textures), frozenset(fixed), tuple(sorted(part for part in parts if _is_of_all(part.name)))
+    names = mesh.keys() - textures - {"face_texcoords", "face_textures", "face_materials"}
+    of_all = tuple(sorted(part for part in parts if _is_of_all(part.name)))
+    return frozenset(_split(settings)), bool(textures), frozenset(names), of_all
 
 
 def groups_of(spec, frames, arrays):
@@ -62,8 +82,8 @@ def groups_by_size(meshes, pixels):
     for mesh in sorted(meshes):
         group = [*groups[-1], mesh]
         faces, vertices, most = faces + mesh[0], vertices + mesh[1], max(most, mesh[1])
-        fits = (len(group) * mesh[0] <= _SMALL + _MOST_PADDING * faces and len(group) * most <= _SMALL + _MOST_PADDING * vertices
-                and len(group) * pixels <= _MOST_PIXELS)
+        fits = (len(group) * mesh[0] <= _SMALL + _MOST_PADDING * faces
+                and len(group) * most <= _SMALL + _MOST_PADDING * vertices and len(group) * pixels <= _MOST_PIXELS)
         if fits or len(group) == 1:
             groups[-1] = group
         else:
