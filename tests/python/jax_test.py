@@ -40,6 +40,49 @@ class JaxTest(unittest.TestCase):
                 self.assertGreater(np.abs(theirs).sum(), 0)
                 np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-5)
 
+    def test_own_shading(self):
+        """The library's own colours, found by the caller: its images and gradients."""
+        views, intrinsics = cameras(2)
+        renderer, colors, background = dpr.Renderer(SIZE, SIZE, blur=0.6, gamma=1e-7), random(4, 3, seed=5), [0.1, 0.2, 0.3]
+        weights = random(2, SIZE, SIZE, 4, seed=3) - 0.5
+        image, pullback = renderer.vjp(TETRAHEDRON, FACES, views, intrinsics, colors=colors, background=background)
+        expected = pullback(weights)
+
+        def loss(vertices, colors, views, intrinsics):
+            samples = renderer.rasterize(vertices, FACES, views, intrinsics)
+            mask = samples.mask[..., None]
+            shown = jnp.where(mask, samples.interpolate(colors), jnp.asarray(background))
+            found = samples.resolve(jnp.concatenate([shown, mask.astype(jnp.float32)], -1))
+            return (found * weights).sum(), found
+
+        given = tuple(map(jnp.asarray, (TETRAHEDRON, colors, views, intrinsics)))
+        for transformed in (jax.value_and_grad, lambda *a, **k: jax.jit(jax.value_and_grad(*a, **k))):
+            (_, found), gradients = transformed(loss, argnums=(0, 1, 2, 3), has_aux=True)(*given)
+            np.testing.assert_allclose(found, image, atol=1e-5)
+            for gradient, name in zip(gradients, ("vertices", "colors", "views", "intrinsics")):
+                scale = np.abs(expected[name]).max()
+                self.assertGreater(scale, 0)
+                wanted = expected[name]
+                if name == "views":  # those of affine matrices are the library's, of rigid motions the samples'
+                    continue
+                np.testing.assert_allclose(gradient / scale, wanted / scale, atol=1e-4, err_msg=name)
+
+        def depths(vertices):
+            samples = renderer.rasterize(vertices, FACES, views, intrinsics, layers=2)
+            return sum((layer.depth * layer.mask).sum() for layer in samples.layers)
+
+        direction = random(4, 3, seed=8) - 0.5
+        found = (jax.grad(depths)(given[0]) * direction).sum()
+        samples = renderer.rasterize(TETRAHEDRON, FACES, views, intrinsics, layers=2)
+        by_hand = sum(layer.pullback(depth=layer.mask.astype(np.float32))["vertices"] for layer in samples.layers)
+        self.assertAlmostEqual(float(found) / float((by_hand * direction).sum()), 1, delta=1e-4)
+        traced = renderer.rasterize(given[0], FACES, views, intrinsics)
+        for refused in (lambda: traced.resolve(np.zeros((2, 3, 3, 1), np.float32)),
+                        lambda: traced.jvp({"vertices": direction}),
+                        lambda: dpr.Renderer(SIZE, SIZE, **SMOOTH).rasterize(given[0], FACES, views, intrinsics)):
+            with self.assertRaises((ValueError, TypeError)):
+                refused()
+
     def test_converted_arguments(self):
         views, intrinsics = cameras(1)
         renderer, shapes = dpr.Renderer(SIZE, SIZE, **SMOOTH), np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])

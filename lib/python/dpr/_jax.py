@@ -7,22 +7,29 @@ import numpy as np
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from . import _frames
+from . import _arrays, _frames, _samples
 
 
 def _forward(spec, *leaves):
     rendered = _rendered(spec, leaves, ())
     if rendered.warning:
         warnings.warn(rendered.warning)
+    return _as_jax_has_them(rendered.outputs)
+
+
+def _as_jax_has_them(outputs):
     return tuple(output.astype(np.int32) if output.dtype == np.int64 and not jax.config.jax_enable_x64 else output
-                 for output in rendered.outputs)
+                 for output in outputs)
+
+
+def _view_count(spec, leaves):
+    return leaves[next(int(part.split("|")[2]) for part in spec.parts if "|views|" in part)].shape[0]
 
 
 def _shapes(spec, leaves):
     """Of the image and the outputs."""
-    views = next(int(part.split("|")[2]) for part in spec.parts if "|views|" in part)
     return tuple(jax.ShapeDtypeStruct(shape, jax.dtypes.canonicalize_dtype(dtype))
-                 for shape, dtype in _frames.shapes_of(spec, leaves[views].shape[0]))
+                 for shape, dtype in _frames.shapes_of(spec, _view_count(spec, leaves)))
 
 
 def _call(spec, leaves):
@@ -138,3 +145,95 @@ ad.primitive_jvps[_tangents_p] = _refuse
 def render(spec, leaves):
     """The outputs. Their warnings are told where they are computed."""
     return list(_render(spec, [jax.numpy.asarray(leaf) for leaf in leaves]))
+
+
+# ---- Shading of the caller's own: in reverse mode. Each pass rasterizes again. ----
+
+class _Traced:
+    """What Samples need of a frame that is yet to come."""
+
+    def __init__(self, spec):
+        self.spec, self.raster, self.warning = spec, _samples.raster_of(spec), None
+
+
+def _rasterized(spec, leaves):
+    leaves = [np.asarray(leaf) for leaf in leaves]
+    return _samples.Rasterized(spec, leaves, [i for i, leaf in enumerate(leaves) if leaf.dtype == np.float32])
+
+
+def _shapes_of_samples(spec, leaves):
+    raster = _samples.raster_of(spec)
+    size = (raster.layers, _view_count(spec, leaves), raster.height, raster.width)
+    return (jax.ShapeDtypeStruct(size, jax.dtypes.canonicalize_dtype(np.int64)),
+            jax.ShapeDtypeStruct((*size, 3), np.float32), jax.ShapeDtypeStruct(size, np.float32))
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _samples_of(spec, leaves):
+    def forward(*leaves):
+        rasterized = _rasterized(spec, leaves)
+        if rasterized.warning:
+            warnings.warn(rasterized.warning)
+        return _as_jax_has_them(rasterized.outputs)
+
+    return jax.pure_callback(forward, _shapes_of_samples(spec, leaves), *leaves, vmap_method="sequential")
+
+
+def _of_floats(leaves):
+    return [jax.ShapeDtypeStruct(leaf.shape, np.float32) for leaf in leaves if leaf.dtype == np.float32]
+
+
+def _by_leaf(leaves, gradients):
+    gradients = iter(gradients)
+    return [next(gradients) if leaf.dtype == np.float32 else None for leaf in leaves]
+
+
+def _samples_backward(spec, leaves, cotangents):
+    def backward(leaves, grads):
+        rasterized = _rasterized(spec, leaves)
+        found = rasterized.gradients(dict(zip(("barycentrics", "depth"), grads)))
+        return [found[leaf] for leaf in sorted(found)]
+
+    found = jax.pure_callback(backward, _of_floats(leaves), leaves, cotangents[1:], vmap_method="sequential")
+    return (_by_leaf(leaves, found),)
+
+
+_samples_of.defvjp(lambda spec, leaves: (_samples_of(spec, leaves), leaves), _samples_backward)
+
+
+@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _resolve(spec, values, leaves):
+    def forward(values, *leaves):
+        return _rasterized(spec, leaves).resolve(np.asarray(values))
+
+    shape = (_view_count(spec, leaves), spec.height, spec.width, values.shape[-1])
+    return jax.pure_callback(forward, jax.ShapeDtypeStruct(shape, np.float32), values, *leaves, vmap_method="sequential")
+
+
+def _resolve_backward(spec, kept, grad_images):
+    values, leaves = kept
+
+    def backward(values, leaves, grad_images):
+        rasterized = _rasterized(spec, leaves)
+        grad_values, found = rasterized.resolve_gradients(np.asarray(values), np.asarray(grad_images))
+        return [grad_values, *(found[leaf] for leaf in sorted(found))]
+
+    shapes = [jax.ShapeDtypeStruct(values.shape, np.float32), *_of_floats(leaves)]
+    grad_values, *found = jax.pure_callback(backward, shapes, values, leaves, grad_images, vmap_method="sequential")
+    return grad_values, _by_leaf(leaves, found)
+
+
+_resolve.defvjp(lambda spec, values, leaves: (_resolve(spec, values, leaves), (values, leaves)), _resolve_backward)
+
+
+def rasterize(spec, leaves):
+    """(what Samples need of a frame, its outputs, the arrays that resolve() depends on)"""
+    leaves = [jax.numpy.asarray(leaf) for leaf in leaves]
+    return _Traced(spec), _samples_of(spec, leaves), leaves
+
+
+def resolve(traced, values, leaves):
+    size = _shapes_of_samples(traced.spec, leaves)[0].shape[1:]
+    if values.ndim != 4 or values.shape[:3] != size or not values.size:
+        _arrays.fail(ValueError, "values", list(values.shape), f"[{', '.join(map(str, size))}, C]", "dpr.Samples")
+    return _resolve(traced.spec, jax.numpy.asarray(values, np.float32), leaves)

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import functools
 import sys
 from typing import Any, Callable, Dict, Optional, Tuple
 
@@ -106,6 +107,15 @@ class Rasterized:
                                  if part.leaf in given])
 
 
+@functools.lru_cache(maxsize=64)
+def raster_of(spec):
+    """The raster of a spec's samples."""
+    camera = [("views", np.eye(4, dtype=np.float32)[None]), ("intrinsics", np.ones((1, 4), np.float32))]
+    frame, raster = _frames.Frame(_frames.options_of(spec), camera + _frames.NO_MESH), _library.Raster()
+    _library.call("dpr_frame_raster", frame.handle, ctypes.byref(raster))
+    return raster
+
+
 def _unpadded(arrays):
     """(name, array) pairs in which meshes of a batch, faces [N, F, 3], are padded as frames take them: with faces of one
     vertex, and vertices at the place of the first one."""
@@ -152,9 +162,9 @@ class Samples:
                    the nearest surfaces, unless this is one of `layers`
     supersampling  samples a pixel and axis; margin: samples around the image, so that h = height supersampling + 2 margin
 
-    With PyTorch barycentrics, depth and what is made of them have derivatives by vertices, views and intrinsics; with other
-    arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and resolve_with_jvp(). Without PyTorch a
-    gradient goes back like this:
+    With PyTorch, and in reverse mode with JAX, barycentrics, depth and what is made of them have derivatives by vertices,
+    views and intrinsics; with other arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and
+    resolve_with_jvp(). A gradient goes back like this then:
 
         corners = colors[faces[samples.face_id.clip(0)]]  # [N, h, w, 3, C]
         image, resolved = samples.resolve_with_vjp((samples.barycentrics[..., None] * corners).sum(-2))  # interpolate()
@@ -175,6 +185,10 @@ class Samples:
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
         self._outputs = outputs
         self._vertices = next(array.shape[-2] for path, array in zip(plan.paths, plan.given) if path == ("vertices",))
+
+    @property
+    def _is_of_jax(self):
+        return _arrays.module_of(self.depth) == "jax"
 
     @property
     def layers(self) -> Tuple[Samples, ...]:
@@ -210,9 +224,15 @@ class Samples:
             attributes[np.arange(len(attributes))[:, None, None, None], corners]
         return (self.barycentrics[..., None] * values).sum(-2)
 
+    def _require_numpy(self, function):
+        if self._is_of_jax:
+            _arrays.fail(TypeError, function, "samples of JAX", "jax.vjp() and jax.grad() of resolve()", "dpr.Samples")
+
     def _of_my_kind(self, name, array):
         """Floats, as tensors if the samples are. Fails for a tensor whose gradient would be lost."""
         array = _arrays.converted(name, _arrays.from_numbers(array), where="dpr.Samples")
+        if self._is_of_jax:
+            return sys.modules["jax"].numpy.asarray(array)
         if self._tensors is not None:
             return array if _arrays.module_of(array) == "torch" else sys.modules["torch"].from_dlpack(_arrays.to_numpy(array))
         if getattr(array, "requires_grad", False):
@@ -226,6 +246,9 @@ class Samples:
         the background's. Contours count that fewer surfaces hide than there are layers: whichever layer's resolve() is
         called. Raises ValueError for another shape, and what is not finite."""
         values = self._of_my_kind("values", values)
+        if self._is_of_jax:
+            from . import _jax
+            return _jax.resolve(self._rasterized, values, self._tensors)
         if self._tensors is not None:
             from . import _torch
             return _torch.resolve(self._rasterized, values, self._tensors)
@@ -234,6 +257,7 @@ class Samples:
     def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
         """(resolve(values), pullback). pullback(grad_images) returns the gradient of the values and, by way of the
         contours, those of vertices, views and intrinsics, by name; of tensors, of those that required a gradient."""
+        self._require_numpy("resolve_with_vjp()")
         kept = _kept(values)
 
         def pullback(grad_images):
@@ -246,6 +270,7 @@ class Samples:
         """Gradients of vertices, views and intrinsics, by name, from those of barycentrics and depth. They leave out how
         contours move, which resolve_with_vjp() has: add up both, and those of other layers. Of tensors, those that required
         a gradient when rasterize() was called have one."""
+        self._require_numpy("pullback()")
         if not self._rasterized.leaves:
             _arrays.fail(ValueError, "pullback()", "samples of tensors without gradients", "a tensor that requires one",
                          "dpr.Samples")
@@ -259,6 +284,7 @@ class Samples:
         tensors, of those that required a gradient when rasterize() was called. PyTorch takes its own by torch.func.jvp and
         torch.autograd.forward_ad, from 2.0 on. The tangent of interpolate(attributes) is interpolate(those of the
         attributes), plus the attributes of the faces' corners times those of the barycentrics."""
+        self._require_numpy("jvp()")
         count, given = self._moving(tangents)
         found = self._rasterized.tangents(count, given)
         return tuple(_arrays.like(self._plan.given[0], tangent[:, self._layer]) for tangent in found)
@@ -268,6 +294,7 @@ class Samples:
         """(resolve(values), its tangents [K, N, height, width, C]) along K directions, in which the values change by
         value_tangents [K, *values.shape], and by way of the contours, vertices, views and intrinsics by `tangents` as
         jvp() takes them; of both, those left out stay."""
+        self._require_numpy("resolve_with_jvp()")
         kept = _kept(values)
         if value_tangents is not None:
             value_tangents = _kept(value_tangents, "tangents of values")
@@ -299,13 +326,15 @@ def rasterize(spec, plan, copy):
                      "dpr.rasterize")
     leaves = plan.leaves
     kinds = {_arrays.module_of(leaf) for leaf in leaves}
-    if "jax" in kinds:
-        _arrays.fail(TypeError, "vertices", "an array of JAX", "arrays of NumPy or PyTorch", "dpr.rasterize")
     faces = next(leaf for path, leaf in zip(plan.paths, leaves) if path == ("faces",))
     if "torch" in kinds:
         from . import _torch
         rasterized, outputs, tensors = _torch.rasterize(spec, leaves, copy)
         return Samples(rasterized, outputs, sys.modules["torch"].as_tensor(faces).long(), plan, tensors)
+    if "jax" in kinds:
+        from . import _jax
+        rasterized, outputs, arrays = _jax.rasterize(spec, leaves)
+        return Samples(rasterized, outputs, sys.modules["jax"].numpy.asarray(faces), plan, arrays)
     wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
     rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
     outputs = [_arrays.like(plan.given[0], output) for output in rasterized.outputs]
