@@ -2,8 +2,9 @@
 
     PYTHONPATH=build/release/python /usr/bin/python3 bench/experiments/unlike_meshes.py [FACES ...]
 
-Prints milliseconds of an image and its gradient by the vertices, medians, at 128x128 pixels with noise of half a pixel.
-Vertices move from step to step.
+Prints milliseconds of an image and its gradient by the vertices, medians, at 128x128 pixels with noise of half a pixel;
+with PyTorch, of dpr.nvdiffrast too: ranges of one list of triangles, and a call for each mesh. Vertices move from step to
+step.
 """
 import statistics
 import sys
@@ -12,6 +13,12 @@ import time
 import numpy as np
 
 import dpr
+
+try:
+    import torch
+    import dpr.nvdiffrast as dr
+except ImportError:
+    torch = None
 
 COUNT, SIZE, ROUNDS, STEPS = 24, 128, 4, 5
 
@@ -28,6 +35,26 @@ def torus(rings, sectors):
 
     a, b, c, d = (vertex(ring + i, sector + k) for i in (0, 1) for k in (0, 1))
     return vertices.astype(np.float32), np.stack([a, b, c, c, b, d], -1).reshape(-1, 3)
+
+
+def nvdiffrast_ways(vertices, triangles, views):
+    projection = np.array([[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, -1.2, -2.2], [0, 0, -1, 0]])
+    points = [torch.tensor(np.pad(mesh, ((0, 0), (0, 1)), constant_values=1) @ (projection @ view).T, dtype=torch.float32)
+              for mesh, view in zip(vertices, views)]
+    faces = [torch.tensor(own, dtype=torch.int32) for own in triangles]
+    counts = torch.tensor([len(own) for own in faces], dtype=torch.int32)
+    firsts = np.cumsum([0, *(len(own) for own in points)])
+    joined = torch.cat([own + int(first) for own, first in zip(faces, firsts)])
+    ranges, context = torch.stack([counts.cumsum(0) - counts, counts], 1).int(), dr.RasterizeCudaContext()
+
+    def step(points, faces, ranges=None):
+        points = (points + 1e-3 * float(np.random.default_rng().random())).requires_grad_()
+        rast, _ = dr.rasterize(context, points, faces, [SIZE, SIZE], ranges=ranges)
+        colors, _ = dr.interpolate(points.detach()[..., :3].contiguous(), rast, faces)
+        dr.antialias(colors, rast, points, faces).square().sum().backward()
+
+    return {"ranges": lambda: step(torch.cat(points), joined, ranges),
+            f"{COUNT} antialiased images": lambda: [step(own[None], its) for own, its in zip(points, faces)]}
 
 
 def measure(faces):
@@ -51,6 +78,8 @@ def measure(faces):
                                    for i, (mesh, own) in enumerate(zip(vertices, triangles))],
         "shapes of one mesh": lambda: step(np.stack([moved(vertices[0]) for _ in range(COUNT)]), triangles[0], views),
     }
+    if torch:
+        ways.update(nvdiffrast_ways(vertices, triangles, views))
     times = {name: [] for name in ways}
     for _ in range(ROUNDS):
         for name, way in ways.items():
@@ -61,8 +90,9 @@ def measure(faces):
                 times[name].append(1e3 * (time.perf_counter() - start))
     medians = {name: statistics.median(of_way) for name, of_way in times.items()}
     mean, listed = statistics.mean(map(len, triangles)), ", ".join(f"{name} {ms:.1f} ms" for name, ms in medians.items())
-    ratio = medians["one call"] / medians[f"{COUNT} calls"]
-    print(f"{mean:.0f} faces: {listed}; one call over {COUNT} calls {ratio:.2f}", flush=True)
+    ratios = [medians[one] / medians[f"{COUNT} {many}"] for one, many in (("one call", "calls"), ("ranges", "antialiased images"))
+              if one in medians]
+    print(f"{mean:.0f} faces: {listed}; one over {COUNT}: {', '.join(f'{ratio:.2f}' for ratio in ratios)}", flush=True)
 
 
 for count in map(int, sys.argv[1:] or (144, 1600, 10000)):
