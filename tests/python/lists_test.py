@@ -166,6 +166,14 @@ class ListsTest(unittest.TestCase):
         self.assertEqual(groups([4, 4000, 5, 3000]), [[0, 2], [1, 3]])
         self.assertEqual(groups([4, 6], estimator="monte_carlo"), [[0], [1]])
 
+    def test_one_texture_for_all(self):
+        texture, texcoords = random(4, 4, 3), [random(len(vertices), 2) for vertices in VERTICES]
+        renderer = dpr.Renderer(SIZE, SIZE)
+        images = [renderer(VERTICES, FACES, VIEWS, LENS, texcoords=texcoords, textures=textures)
+                  for textures in (texture, [texture] * 4)]
+        self.assertGreater(np.abs(images[0]).max(), 0.1)
+        np.testing.assert_array_equal(*images)
+
     def test_what_is_wrong_with_one_mesh(self):
         """Indices and sizes that the arrays of another mesh would bear."""
         given = textured()
@@ -213,7 +221,7 @@ class ListsTest(unittest.TestCase):
 
     def test_a_mesh_that_shows_nothing_is_told(self):
         far = [VERTICES[0], VERTICES[2] + np.float32([0, 99, 0])]
-        with self.assertWarnsRegex(UserWarning, "every triangle was dropped"):
+        with self.assertWarnsRegex(UserWarning, r"every triangle was dropped.*\(view 1\)"):
             dpr.render(far, [FACES[0], FACES[2]], VIEWS[:2], LENS, width=SIZE, height=SIZE)
 
 

@@ -174,8 +174,8 @@ class TexturesTest(RenderTest):
         self.assert_same(images, expected)
         (images.square().sum() + expected.square().sum()).backward()
         self.assert_same_gradients(found, alone)
-        with self.assertRaisesRegex(ValueError, "textures .* got Tensor, expected a list of 3"):
-            renderer(vertices, faces, views, intrinsics, textures=random(4, 4, 3), texcoords=3 * [None])
+        with self.assertRaisesRegex(ValueError, "texcoords .* got Tensor, expected a list of 3"):
+            renderer(vertices, faces, views, intrinsics, textures=random(4, 4, 3), texcoords=random(4, 2))
 
     def test_padded_meshes(self):
         views, intrinsics = cameras(2)

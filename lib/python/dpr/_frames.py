@@ -190,13 +190,14 @@ class Rendered:
                 raw[name][rows] = array
         self._frames.append((frame, lot, rows))
         if has_mesh:
-            self._warn(frame, [parts for _, parts in own], arrays, found["image"])
+            self._warn(frame, group if len(frames) > 1 else [], [parts for _, parts in own], arrays, found["image"])
 
-    def _warn(self, frame, parts, arrays, images):
-        """Notes that a view shows nothing, or that triangles lie beyond zfar."""
+    def _warn(self, frame, views, parts, arrays, images):
+        """Notes that a view shows nothing, or that triangles lie beyond zfar; views: the numbers of those in a list."""
         zfar = next((float(text[5:]) for text in reversed(self.spec.settings) if text.startswith("zfar=")), None)
-        if frame.is_empty() or (len(parts) > 1 and not images[..., 3].any((1, 2)).all()):
-            self.warning = self.warning or NOTHING_RENDERED
+        empty = [view for view, image in zip(views, images) if not image[..., 3].any()] if len(views) > 1 else views
+        if frame.is_empty() or len(views) > 1 and empty:
+            self.warning = self.warning or NOTHING_RENDERED + (f" (view {empty[0]})" if empty else "")
         for of_view in parts if zfar is not None else ():
             named = {part.name: part.of(arrays[part.leaf]) for part in of_view}
             count = _faces_beyond(zfar, named["vertices"], named["faces"], named["views"])

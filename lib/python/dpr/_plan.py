@@ -198,10 +198,12 @@ def _meshes_of_each(mesh, count):
 
 
 def _lists_of_meshes(meshes, views):
-    """The same of meshes that are lists already. Words and materials may be those of all, one mesh that of all views."""
+    """The same of meshes that are lists already. Words, materials and a texture may be those of all, a mesh that of all
+    views."""
     lists, count = {}, 1 if len(meshes["faces"]) == 1 else views
     for name, given in meshes.items():
-        if given is None or isinstance(given, (str, dict)):
+        is_of_all = name == "textures" and _arrays.is_array(given) and len(given.shape) == 3
+        if given is None or isinstance(given, (str, dict)) or is_of_all:
             given = [given] * count
         if name == "textures" and _has_views(given, 3):
             given = [_Row(given, i, None) for i in range(given.shape[0])]

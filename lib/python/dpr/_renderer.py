@@ -113,8 +113,8 @@ class Renderer:
                      k4; [N, 1], orthographic: world units from the lower to the upper edge
         colors       [V, 3] or [N, V, 3], linear RGB of the vertices; or
         face_colors  [F, 3] or [N, F, 3], of the faces; white without either
-        opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1
-                     outputs with gradients are refused, and so is dpr.rasterize()
+        opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1 outputs
+                     with gradients are refused. The barrier composition (the preset "softras" say) hardly heeds them
         texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
         face_texcoords  [F, 3], int64 or int32: their indices
         textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by

@@ -124,7 +124,7 @@ def _unpadded(arrays):
         return list(arrays.items())
     _merged.require_padding(faces)
     arrays = {**arrays, "faces": faces.clip(0)}
-    if arrays["vertices"].ndim < 3:
+    if arrays["vertices"].ndim < 3 or len(arrays["vertices"]) != len(faces):
         return list(arrays.items())  # is refused
     is_there = np.arange(arrays["vertices"].shape[-2]) <= faces.max((1, 2))[:, None]
     first = np.take_along_axis(arrays["vertices"], faces.clip(0)[:, :1, :1], 1)
@@ -218,6 +218,8 @@ class Samples:
             wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
             _arrays.fail(ValueError, "attributes", list(shape), f"[V, C] or [{count}, V, C], V: {wanted}", "dpr.Samples")
         faces = self._faces if faces is None else faces
+        if 0 in (*faces.shape, shape[-2]):
+            return self.barycentrics[..., :1] * attributes.sum(-2)[..., None, None, :]  # 0: there is nothing
         views = np.arange(count)[:, None, None]
         corners = faces[views, self.face_id.clip(0)] if faces.ndim == 3 else faces[self.face_id.clip(0)]
         values = attributes[corners] if len(shape) == 2 else \
@@ -244,7 +246,8 @@ class Samples:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
         the background's. Contours count that fewer surfaces hide than there are layers: whichever layer's resolve() is
-        called. Raises ValueError for another shape, and what is not finite."""
+        called. Beside contours samples are continued, so that images may leave the values' range by a little. Raises
+        ValueError for another shape, and what is not finite."""
         values = self._of_my_kind("values", values)
         if self._is_of_jax:
             from . import _jax
