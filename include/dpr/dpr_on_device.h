@@ -63,7 +63,7 @@ DPR_API dpr_status dpr_renderer_set_normals_from(dpr_renderer* renderer, size_t 
 /* Four floats: `specular`, and `shininess`; one below 1 is the lights'. */
 DPR_API dpr_status dpr_renderer_set_materials_from(dpr_renderer* renderer, size_t mesh,
                                                    const dpr_buffer* materials, const dpr_events* events);
-/* From 0 to 1, which is not checked; noise on the pixel refuses them whatever they are. */
+/* From 0 to 1, which is not checked. */
 DPR_API dpr_status dpr_renderer_set_opacities_from(dpr_renderer* renderer, size_t mesh,
                                                    const dpr_buffer* opacities, const dpr_events* events);
 DPR_API dpr_status dpr_renderer_set_texel_opacities_from(dpr_renderer* renderer, size_t mesh, size_t texture,

@@ -217,9 +217,9 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// Gives every view a shape of its own, so that one batch renders many meshes of one topology: positions
   /// [view][vertex], object space, and colours [view][color], each counting all meshes of the scene one after
   /// the other, without instances, which have their mesh's. Empty: the scene's own for all views, to which
-  /// set_views() returns as well. With noise on the pixel, faces on the far side of closed meshes are kept,
-  /// which those of a scene's own shape are not: images and gradients differ by what these add at edges
-  /// (a cube at 128x128: 0.008 of an image's 1, 4% of a pose's gradient).
+  /// set_views() returns as well. With noise on the pixel, faces on the far side of closed meshes are kept where
+  /// positions come from buffers, or a mesh has 65,536 faces or more: images and gradients differ by what these
+  /// add at edges (a cube at 128x128: 0.008 of an image's 1, 4% of a pose's gradient).
   void set_shapes(std::span<const vec3> positions, std::span<const vec3> colors);
   /// New lights, or none.
   void set_lights(const std::optional<Lights>& lights);
@@ -271,11 +271,12 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// How many of each sample's surfaces samples() tells apart, from the nearest on: 1 unless set, at most 256. With
   /// more than one, whoever shades them may blend them as see-through: frames keep what lies behind other surfaces,
   /// faces on the far side of closed meshes too, and resolve() follows every contour that fewer than `count` surfaces
-  /// hide. The library's own images take longer then, and differ as set_shapes() says. Throws InvalidArgument.
+  /// hide. The library's own images take longer then, and differ by the far sides, as set_shapes() says. Throws
+  /// InvalidArgument.
   void set_layers(int count);
   /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or
   /// textures, which have no part in it. The nearest surfaces alone count, whatever gamma is. Blocks. Throws as image()
-  /// does, and InvalidArgument without noise on the pixel.
+  /// does, and InvalidArgument without noise on the pixel, and with opacities below 1.
   Samples samples();
   /// Gradients of <grad_barycentrics, barycentrics> + <grad_depths, depths> by positions, transforms and cameras, as
   /// far as Scene::gradients asks for these. At contours, where samples jump from face to face, resolve_backward() has
