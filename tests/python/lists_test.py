@@ -200,6 +200,20 @@ class ListsTest(unittest.TestCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, "view 1"):
                 render()
 
+    def test_what_is_not_finite_is_told_of_its_mesh(self):
+        bad = [VERTICES[0], VERTICES[1].copy()]
+        bad[1][5] = np.nan
+        colors = [np.ones_like(vertices) for vertices in VERTICES[:2]]
+        colors[1][2] = np.nan
+        given = {"texcoords": [random(len(vertices), 2) for vertices in VERTICES[:2]]}
+        cases = {r"vertices\[5\] \(view 1\): got \(nan": (bad, {}),
+                 r"colors\[2\] \(view 1\)": (VERTICES[:2], {"colors": colors}),
+                 r"textures, texel 1 \(view 0\)": (VERTICES[:2], {**given, "textures": np.float32([[[1] * 3, [np.nan] * 3]])}),
+                 r"textures, alpha of texel 0 \(view 0\)": (VERTICES[:2], {**given, "textures": np.float32([[[1, 1, 1, 2]]])})}
+        for words, (vertices, arguments) in cases.items():
+            with self.subTest(words), self.assertRaisesRegex(dpr.InvalidArgument, words):
+                dpr.render(vertices, FACES[:2], VIEWS[:2], LENS, width=SIZE, height=SIZE, **arguments)
+
     def test_refused(self):
         spec = dpr.Renderer(SIZE, SIZE)._spec()
         faces = np.stack([FACES[0], FACES[0]])

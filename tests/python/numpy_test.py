@@ -127,7 +127,7 @@ class NumpyTest(unittest.TestCase):
         gradient = renderer.vjp(**arguments, **faces, textures=mixed, wrt=["textures"])[1](plain)["textures"]
         self.assertEqual([texture.shape for texture in gradient], [(5, 7, 3), (5, 7, 4)])
         self.assertGreater(np.abs(gradient[1][..., 3]).max(), 0)
-        with self.assertRaisesRegex(ValueError, "opacities.*expected a number from 0 to 1"):
+        with self.assertRaisesRegex(ValueError, "textures, alpha of texel .*expected a number from 0 to 1"):
             renderer(**arguments, textures=2 * leaf)
 
     def test_gradients_through_a_fisheye(self):

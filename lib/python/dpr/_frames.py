@@ -2,6 +2,7 @@
 import collections
 import ctypes
 import functools
+import re
 import weakref
 
 import numpy as np
@@ -74,12 +75,23 @@ def c_arrays(named):
     return slots, len(named)
 
 
+def _in_words_of_arguments(text):
+    """An error of the library's arrays as one of the arguments that they are."""
+    for array, argument in (("positions", r"vertices[\1]"), ("texels", r"textures, texel \1"),
+                            ("texel_opacities", r"textures, alpha of texel \1")):
+        text = re.sub(rf"(?<=error: ){array}\[(\d+)\]", argument, text)
+    return text.replace("k_no_texture", "-1")
+
+
 class Frame:
     """A dpr_frame, destroyed with this; not as the process ends, when the driver may be gone."""
 
     def __init__(self, options, named):
         handle = ctypes.c_void_p()
-        _library.call("dpr_frame_render", ctypes.byref(options), *c_arrays(named), ctypes.byref(handle))
+        try:
+            _library.call("dpr_frame_render", ctypes.byref(options), *c_arrays(named), ctypes.byref(handle))
+        except _library.InvalidArgument as error:
+            raise _library.InvalidArgument(_in_words_of_arguments(str(error))) from None
         self.handle = handle
         weakref.finalize(self, _library.library.dpr_frame_destroy, handle).atexit = False
 
@@ -181,8 +193,9 @@ class Rendered:
                 raise
             if len(group) > 1:  # by itself each says what is wrong, or is rendered
                 return [self._render([i], frames, arrays, wanted, raw) for i in group]
-            text = str(error).replace("(dpr.render)", f"(view {group[0]})").replace("meshes[0]", f"view {group[0]}")
-            raise _library.InvalidArgument(text) from None
+            text, view = str(error), f"view {group[0]}"
+            named = text.replace("(dpr.render)", f"({view})").replace("meshes[0]", view)
+            raise _library.InvalidArgument(named if named != text else text.replace(": got", f" ({view}): got", 1)) from None
         found = {name: array if rows == slice(None) else np.empty_like(array[rows], order="C") for name, array in raw.items()}
         _library.call("dpr_frame_read", frame.handle, *c_arrays(list(found.items())))
         if rows != slice(None):
