@@ -83,6 +83,63 @@ class JaxTest(unittest.TestCase):
             with self.assertRaises((ValueError, TypeError)):
                 refused()
 
+    def test_own_shading_in_forward_mode(self):
+        """<u, J v> = <J^T u, v> for each argument, along one direction and several, under jit too."""
+        views, intrinsics = cameras(2)
+        renderer, colors = dpr.Renderer(SIZE, SIZE, blur=0.6), random(4, 3, seed=5)
+        size = renderer.rasterize(TETRAHEDRON, FACES, views, intrinsics).face_id.shape
+        given = dict(vertices=TETRAHEDRON, views=views, intrinsics=intrinsics, colors=colors, values=random(*size, 4, seed=6))
+        given = {name: jnp.asarray(array) for name, array in given.items()}
+        ways = {name: random(3, *array.shape, seed=i) - 0.5 for i, (name, array) in enumerate(given.items(), 7)}
+        weights = random(2, SIZE, SIZE, 4, seed=3) - 0.5
+
+        def image_of(given):
+            front, back = renderer.rasterize(given["vertices"], FACES, given["views"], given["intrinsics"], layers=2).layers
+            shown = jnp.concatenate([front.interpolate(given["colors"]), (back.depth - front.depth)[..., None]], -1)
+            return front.resolve(shown + given["values"])
+
+        def check(tangent, expected):
+            terms = np.asarray(tangent, np.float64) * weights
+            self.assertGreater(np.abs(expected), 1e-4 * np.abs(terms).sum())
+            self.assertLess(np.abs(terms.sum() - expected), 1e-5 * np.abs(terms).sum())
+
+        image, pull = jax.vjp(image_of, given)
+        gradients, = jax.jit(pull)(jnp.asarray(weights))
+        by_gradients = {name: (np.asarray(gradients[name], np.float64) * ways[name]).reshape(3, -1).sum(1) for name in given}
+
+        def push(function, value):
+            return jax.jvp(function, (value,), (1.0,))
+
+        def linearized(function, value):
+            found, tangent_of = jax.linearize(function, value)
+            return found, tangent_of(1.0)
+        for name, array in given.items():
+            def along(amount):
+                return image_of({**given, name: array + amount * ways[name][0]})
+            for found, tangent in (push(along, 0.0), jax.jit(lambda: push(along, 0.0))(), linearized(along, 0.0)):
+                np.testing.assert_allclose(found, image, atol=1e-6)
+                check(tangent, by_gradients[name][0])
+
+        def along_all(amounts):
+            return image_of({name: array + jnp.tensordot(amounts, ways[name], 1) for name, array in given.items()})
+        for jacobian_of in (jax.jacfwd(along_all), jax.jit(jax.jacfwd(along_all))):
+            jacobian = jacobian_of(np.zeros(3, np.float32))
+            self.assertEqual(jacobian.shape, (2, SIZE, SIZE, 4, 3))
+            for k, expected in enumerate(sum(by_gradients.values())):
+                check(jacobian[..., k], expected)
+        backward = jax.jacrev(along_all)(np.zeros(3, np.float32))
+        np.testing.assert_allclose(backward, jacobian, atol=1e-4 * np.abs(jacobian).max())
+
+        def of_scale(scale):  # shapes that are a batch of JAX's are rasterized one after the other
+            return image_of({**given, "vertices": scale * TETRAHEDRON})
+        scales = np.float32([1, 0.9])
+        _, batch = jax.vmap(lambda scale: push(of_scale, scale))(scales)
+        for scale, tangent in zip(scales, batch):
+            np.testing.assert_allclose(tangent, push(of_scale, scale)[1], atol=1e-5)
+        for second in (jax.jacfwd(jax.jacfwd(along_all)), jax.hessian(lambda amounts: along_all(amounts).sum())):
+            with self.assertRaisesRegex(NotImplementedError, "no second derivatives"):
+                second(np.zeros(3, np.float32))
+
     def test_converted_arguments(self):
         views, intrinsics = cameras(1)
         renderer, shapes = dpr.Renderer(SIZE, SIZE, **SMOOTH), np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])

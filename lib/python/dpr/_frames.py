@@ -165,9 +165,10 @@ class Rendered:
     """
 
     def __init__(self, spec, arrays, wanted):
-        """arrays: of float32, int32 or int64; wanted: indices of those whose gradients gradients() may be asked for."""
+        """arrays: of float32, int32 or int64; wanted: indices of those with derivatives."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
         self.spec, self._shapes, self._frames, self.warning = spec, [array.shape for array in arrays], [], None
+        self._wanted = wanted
         frames = frames_of(spec.parts)
         views = next((arrays[part.leaf] for part in frames[0][1] if part.name == "views"))
         shapes = shapes_of(spec, len(views) if views.ndim else 0)
@@ -223,7 +224,7 @@ class Rendered:
         return [1 + i for i, name in enumerate(self.spec.outputs)
                 if name in OTHERS or not names & _OF_OUTPUTS]
 
-    def gradients(self, grads, wanted):
+    def gradients(self, grads):
         """{index: gradient} of sum <grad, output>, of the outputs whose grad is not None."""
         raw = {}
         for name, grad in zip(["image", *self.spec.outputs], grads):
@@ -231,7 +232,7 @@ class Rendered:
                 continue
             grad = np.asarray(grad, np.float32)
             raw[name] = np.ascontiguousarray(grad if name == "image" else _gradient_of_means(name, self._sums[name], grad))
-        totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in wanted}
+        totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in self._wanted}
         for frame, lot, rows in self._frames:
             of_images, found = [(name, grad[rows]) for name, grad in raw.items()], lot.gradients(totals)
             _library.call("dpr_frame_backward", frame.handle, *c_arrays(of_images), *c_arrays(found))

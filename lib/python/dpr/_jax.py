@@ -1,4 +1,4 @@
-"""The front of JAX: a function with derivatives that calls back to this process, under jit too."""
+"""The front of JAX: functions with derivatives in both modes that call back to this process, under jit too."""
 import functools
 import warnings
 
@@ -10,11 +10,77 @@ from jax.interpreters import ad, batching, mlir
 from . import _arrays, _frames, _samples
 
 
-def _forward(spec, *leaves):
-    rendered = _rendered(spec, leaves, ())
-    if rendered.warning:
-        warnings.warn(rendered.warning)
-    return _as_jax_has_them(rendered.outputs)
+# Three kinds of pass from a call's arrays to outputs. JAX asks each for the outputs' shapes, and which have derivatives,
+# before it runs: made of (spec, arrays, numbers of the arrays with derivatives).
+
+
+class _Images(_frames.Rendered):
+    """(arrays of a call) to its image and outputs."""
+
+    @staticmethod
+    def shapes(spec, arrays):
+        return _frames.shapes_of(spec, _view_count(spec, arrays))
+
+    @staticmethod
+    def differentiable(spec):
+        return [0] + [i for i, name in enumerate(spec.outputs, 1) if name in _frames.WITH_GRADIENTS]
+
+    def tangents(self, given):
+        images = super().tangents(given)
+        return [images, *(np.zeros((len(images), *self.outputs[i].shape), np.float32)
+                          for i in self.differentiable(self.spec)[1:])]
+
+
+class _Layers(_samples.Rasterized):
+    """(arrays of a call) to face_id, barycentrics and depth, for shading of the caller's own."""
+
+    @staticmethod
+    def shapes(spec, arrays):
+        raster = _samples.raster_of(spec)
+        size = (raster.layers, _view_count(spec, arrays), raster.height, raster.width)
+        return [(size, np.int64), ((*size, 3), np.float32), (size, np.float32)]
+
+    @staticmethod
+    def differentiable(spec):
+        return [1, 2]
+
+
+class _Resolved(_samples.Rasterized):
+    """(arrays of a call, values of its samples) to images."""
+
+    def __init__(self, spec, arrays, wanted):
+        *leaves, self._values = arrays
+        self._number = len(leaves)  # of the values
+        super().__init__(spec, leaves, [i for i in wanted if i < self._number])
+        self.warning = None
+
+    @property
+    def outputs(self):
+        return [self.resolve(self._values)]
+
+    @staticmethod
+    def shapes(spec, arrays):
+        return [((_view_count(spec, arrays), spec.height, spec.width, arrays[-1].shape[-1]), np.float32)]
+
+    @staticmethod
+    def differentiable(spec):
+        return [0]
+
+    def tangents(self, given):
+        count = len(next(iter(given.values())))
+        return [self.resolve_tangents(count, self._values, given.get(self._number), given)]
+
+    def gradients(self, grads):
+        grad_values, found = self.resolve_gradients(self._values, grads[0])
+        return {**found, self._number: grad_values}
+
+
+def _view_count(spec, arrays):
+    return arrays[next(int(part.split("|")[2]) for part in spec.parts if "|views|" in part)].shape[0]
+
+
+def _ran(kind, spec, arrays, wanted):
+    return kind(spec, [np.asarray(array) for array in arrays], wanted)
 
 
 def _as_jax_has_them(outputs):
@@ -22,40 +88,30 @@ def _as_jax_has_them(outputs):
                  for output in outputs)
 
 
-def _view_count(spec, leaves):
-    return leaves[next(int(part.split("|")[2]) for part in spec.parts if "|views|" in part)].shape[0]
+@functools.partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _run(kind, spec, arrays):
+    """The outputs. Their warnings are told where they are computed."""
+    def forward(*arrays):
+        found = _ran(kind, spec, arrays, ())
+        if found.warning:
+            warnings.warn(found.warning)
+        return _as_jax_has_them(found.outputs)
+
+    shapes = tuple(jax.ShapeDtypeStruct(shape, jax.dtypes.canonicalize_dtype(dtype))
+                   for shape, dtype in kind.shapes(spec, arrays))
+    return jax.pure_callback(forward, shapes, *arrays, vmap_method="sequential")
 
 
-def _shapes(spec, leaves):
-    """Of the image and the outputs."""
-    return tuple(jax.ShapeDtypeStruct(shape, jax.dtypes.canonicalize_dtype(dtype))
-                 for shape, dtype in _frames.shapes_of(spec, _view_count(spec, leaves)))
-
-
-def _call(spec, leaves):
-    return jax.pure_callback(functools.partial(_forward, spec), _shapes(spec, leaves), *leaves, vmap_method="sequential")
-
-
-@functools.partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _render(spec, leaves):
-    return _call(spec, leaves)
-
-
-def _differentiable(spec):
-    """Numbers of the outputs that have derivatives."""
-    return [0] + [i for i, name in enumerate(spec.outputs, 1) if name in _frames.WITH_GRADIENTS]
-
-
-def _push(spec, primals, tangents):
-    (leaves,), (tangents,) = primals, tangents
-    outputs = _render(spec, leaves)
+def _push(kind, spec, primals, tangents):
+    (arrays,), (tangents,) = primals, tangents
+    outputs = _run(kind, spec, arrays)
     symbolic_zero = jax.custom_derivatives.SymbolicZero
     wanted = tuple(i for i, tangent in enumerate(tangents)
-                   if not isinstance(tangent, symbolic_zero) and leaves[i].dtype == np.float32)
+                   if not isinstance(tangent, symbolic_zero) and arrays[i].dtype == np.float32)
     found = {}
     if wanted:
-        moved = _tangents_p.bind(*leaves, *(tangents[i][None] for i in wanted), spec=spec, wanted=wanted)
-        found = {i: tangent[0] for i, tangent in zip(_differentiable(spec), moved)}
+        moved = _tangents_p.bind(*arrays, *(tangents[i][None] for i in wanted), kind=kind, spec=spec, wanted=wanted)
+        found = {i: tangent[0] for i, tangent in zip(kind.differentiable(spec), moved)}
     return outputs, tuple(found[i] if i in found else _no_tangent(output) for i, output in enumerate(outputs))
 
 
@@ -65,51 +121,47 @@ def _no_tangent(output):
     return np.zeros(output.shape, jax.dtypes.float0)
 
 
-_render.defjvp(_push, symbolic_zeros=True)
+_run.defjvp(_push, symbolic_zeros=True)
 
 _tangents_p = Primitive("dpr_tangents")
-"""From leaves, and tangents [K, ...] of the wanted ones, to those of the outputs that have derivatives, [K, ...]. What a
+"""From arrays, and tangents [K, ...] of the wanted ones, to those of the outputs that have derivatives, [K, ...]. What a
 compiled program does between the passes is not known here, so that each renders again."""
 _tangents_p.multiple_results = True
 
 
-def _rendered(spec, leaves, wanted):
-    return _frames.Rendered(spec, [np.asarray(leaf) for leaf in leaves], wanted)
+def _shapes_of_tangents(*arrays, kind, spec, wanted):
+    shapes, count = kind.shapes(spec, arrays[:-len(wanted)]), arrays[-1].shape[0]
+    return [jax.ShapeDtypeStruct((count, *shapes[i][0]), np.float32) for i in kind.differentiable(spec)]
 
 
-def _shapes_of_tangents(*arrays, spec, wanted):
-    shapes = _shapes(spec, arrays)
-    return [jax.ShapeDtypeStruct((arrays[-1].shape[0], *shapes[i].shape), np.float32) for i in _differentiable(spec)]
+def _tangents(*arrays, kind, spec, wanted):
+    def forward(arrays, tangents):
+        return _ran(kind, spec, arrays, wanted).tangents(dict(zip(wanted, map(np.asarray, tangents))))
 
-
-def _tangents(*arrays, spec, wanted):
-    shapes = _shapes_of_tangents(*arrays, spec=spec, wanted=wanted)
-
-    def forward(leaves, tangents):
-        images = _rendered(spec, leaves, wanted).tangents(dict(zip(wanted, map(np.asarray, tangents))))
-        return [images, *(np.zeros(shape.shape, np.float32) for shape in shapes[1:])]
-
+    shapes = _shapes_of_tangents(*arrays, kind=kind, spec=spec, wanted=wanted)
     return jax.pure_callback(forward, shapes, arrays[:-len(wanted)], arrays[-len(wanted):])
 
 
-def _pull_back(cotangents, *arrays, spec, wanted):
-    leaves, tangents = arrays[:-len(wanted)], arrays[-len(wanted):]
-    given = {i: grad for i, grad in zip(_differentiable(spec), cotangents) if not isinstance(grad, ad.Zero)}
+def _pull_back(cotangents, *arrays, kind, spec, wanted):
+    arrays, tangents = arrays[:-len(wanted)], arrays[-len(wanted):]
+    given = {i: grad for i, grad in zip(kind.differentiable(spec), cotangents) if not isinstance(grad, ad.Zero)}
     shapes = [jax.ShapeDtypeStruct(tangent.aval.shape, np.float32) for tangent in tangents]
+    outputs = range(len(kind.shapes(spec, arrays)))
 
-    def backward(leaves, given):
-        rendered, given = _rendered(spec, leaves, wanted), {i: np.asarray(grads) for i, grads in given.items()}
-        found = [rendered.gradients([given[i][k] if i in given else None for i in range(1 + len(spec.outputs))], wanted)
-                 for k in range(shapes[0].shape[0])]
+    def backward(arrays, given):
+        ran, given = _ran(kind, spec, arrays, wanted), {i: np.asarray(grads) for i, grads in given.items()}
+        found = [ran.gradients([given[i][k] if i in given else None for i in outputs]) for k in range(shapes[0].shape[0])]
         return [np.stack([gradients[i] for gradients in found]) for i in wanted]
 
-    return [None] * len(leaves) + jax.pure_callback(backward, shapes, leaves, given, vmap_method="sequential")
+    called = jax.custom_jvp(lambda *given: jax.pure_callback(backward, shapes, *given, vmap_method="sequential"))
+    called.defjvp(_refuse)
+    return [None] * len(arrays) + called(arrays, given)
 
 
-def _batch(arrays, dimensions, *, spec, wanted):
+def _batch(arrays, dimensions, *, wanted, **constants):
     """Directions join those that there are; meshes and cameras of their own are rendered one after the other."""
     size = next(array.shape[dimension] for array, dimension in zip(arrays, dimensions) if dimension is not None)
-    bind = functools.partial(_tangents_p.bind, spec=spec, wanted=wanted)
+    bind = functools.partial(_tangents_p.bind, wanted=wanted, **constants)
 
     def first(array, dimension):
         if dimension is None:
@@ -143,11 +195,9 @@ ad.primitive_jvps[_tangents_p] = _refuse
 
 
 def render(spec, leaves):
-    """The outputs. Their warnings are told where they are computed."""
-    return list(_render(spec, [jax.numpy.asarray(leaf) for leaf in leaves]))
+    """The outputs."""
+    return list(_run(_Images, spec, [jax.numpy.asarray(leaf) for leaf in leaves]))
 
-
-# ---- Shading of the caller's own: in reverse mode. Each pass rasterizes again. ----
 
 class _Traced:
     """What Samples need of a frame that is yet to come."""
@@ -156,84 +206,14 @@ class _Traced:
         self.spec, self.raster, self.warning = spec, _samples.raster_of(spec), None
 
 
-def _rasterized(spec, leaves):
-    leaves = [np.asarray(leaf) for leaf in leaves]
-    return _samples.Rasterized(spec, leaves, [i for i, leaf in enumerate(leaves) if leaf.dtype == np.float32])
-
-
-def _shapes_of_samples(spec, leaves):
-    raster = _samples.raster_of(spec)
-    size = (raster.layers, _view_count(spec, leaves), raster.height, raster.width)
-    return (jax.ShapeDtypeStruct(size, jax.dtypes.canonicalize_dtype(np.int64)),
-            jax.ShapeDtypeStruct((*size, 3), np.float32), jax.ShapeDtypeStruct(size, np.float32))
-
-
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _samples_of(spec, leaves):
-    def forward(*leaves):
-        rasterized = _rasterized(spec, leaves)
-        if rasterized.warning:
-            warnings.warn(rasterized.warning)
-        return _as_jax_has_them(rasterized.outputs)
-
-    return jax.pure_callback(forward, _shapes_of_samples(spec, leaves), *leaves, vmap_method="sequential")
-
-
-def _of_floats(leaves):
-    return [jax.ShapeDtypeStruct(leaf.shape, np.float32) for leaf in leaves if leaf.dtype == np.float32]
-
-
-def _by_leaf(leaves, gradients):
-    gradients = iter(gradients)
-    return [next(gradients) if leaf.dtype == np.float32 else None for leaf in leaves]
-
-
-def _samples_backward(spec, leaves, cotangents):
-    def backward(leaves, grads):
-        rasterized = _rasterized(spec, leaves)
-        found = rasterized.gradients(dict(zip(("barycentrics", "depth"), grads)))
-        return [found[leaf] for leaf in sorted(found)]
-
-    found = jax.pure_callback(backward, _of_floats(leaves), leaves, cotangents[1:], vmap_method="sequential")
-    return (_by_leaf(leaves, found),)
-
-
-_samples_of.defvjp(lambda spec, leaves: (_samples_of(spec, leaves), leaves), _samples_backward)
-
-
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _resolve(spec, values, leaves):
-    def forward(values, *leaves):
-        return _rasterized(spec, leaves).resolve(np.asarray(values))
-
-    shape = (_view_count(spec, leaves), spec.height, spec.width, values.shape[-1])
-    return jax.pure_callback(forward, jax.ShapeDtypeStruct(shape, np.float32), values, *leaves, vmap_method="sequential")
-
-
-def _resolve_backward(spec, kept, grad_images):
-    values, leaves = kept
-
-    def backward(values, leaves, grad_images):
-        rasterized = _rasterized(spec, leaves)
-        grad_values, found = rasterized.resolve_gradients(np.asarray(values), np.asarray(grad_images))
-        return [grad_values, *(found[leaf] for leaf in sorted(found))]
-
-    shapes = [jax.ShapeDtypeStruct(values.shape, np.float32), *_of_floats(leaves)]
-    grad_values, *found = jax.pure_callback(backward, shapes, values, leaves, grad_images, vmap_method="sequential")
-    return grad_values, _by_leaf(leaves, found)
-
-
-_resolve.defvjp(lambda spec, values, leaves: (_resolve(spec, values, leaves), (values, leaves)), _resolve_backward)
-
-
 def rasterize(spec, leaves):
     """(what Samples need of a frame, its outputs, the arrays that resolve() depends on)"""
     leaves = [jax.numpy.asarray(leaf) for leaf in leaves]
-    return _Traced(spec), _samples_of(spec, leaves), leaves
+    return _Traced(spec), _run(_Layers, spec, leaves), leaves
 
 
 def resolve(traced, values, leaves):
-    size = _shapes_of_samples(traced.spec, leaves)[0].shape[1:]
+    size = _Layers.shapes(traced.spec, leaves)[2][0][1:]
     if values.ndim != 4 or values.shape[:3] != size or not values.size:
         _arrays.fail(ValueError, "values", list(values.shape), f"[{', '.join(map(str, size))}, C]", "dpr.Samples")
-    return _resolve(traced.spec, jax.numpy.asarray(values, np.float32), leaves)
+    return _run(_Resolved, traced.spec, [*leaves, jax.numpy.asarray(values, np.float32)])[0]

@@ -96,7 +96,7 @@ def vjp(spec, plan, wrt):
         for (shape, _), grad in zip(_frames.shapes_of(spec, rendered.outputs[0].shape[0]), grads):
             if grad is not None and tuple(grad.shape) != shape:
                 _arrays.fail(ValueError, "gradient", list(grad.shape), list(shape))
-        found = rendered.gradients([grad if grad is None else _arrays.to_numpy(grad) for grad in grads], wanted)
+        found = rendered.gradients([grad if grad is None else _arrays.to_numpy(grad) for grad in grads])
         for leaf, slope in plan.slopes.items():
             if leaf in found:
                 found[leaf] = np.asarray(found[leaf] * slope(), np.float32)

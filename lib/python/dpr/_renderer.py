@@ -227,7 +227,7 @@ class Renderer:
                   copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
-        The arguments are those of a call, of one mesh, N shapes, or N padded meshes. With JAX there is reverse mode alone.
+        The arguments are those of a call, of one mesh, N shapes, or N padded meshes.
         layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;

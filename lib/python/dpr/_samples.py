@@ -15,10 +15,7 @@ _NAMES = ("face_id", "barycentrics", "depth")
 
 
 class Rasterized:
-    """A frame, and what its samples show.
-
-    outputs  [face_id, barycentrics, depth], each [layer, view, ...]
-    """
+    """A frame, and what its samples show."""
 
     def __init__(self, spec, arrays, wanted):
         """arrays, wanted: as Rendered has them."""
@@ -38,9 +35,18 @@ class Rasterized:
         _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
         count = next(len(array) for name, array in named if name == "views")
         self.size, self._image_size = (count, self.raster.height, self.raster.width), (count, spec.height, spec.width)
+
+    @property
+    def _output_shapes(self):
         size = (self.raster.layers, *self.size)
-        self.outputs = [np.empty(size, np.int64), np.empty((*size, 3), np.float32), np.empty(size, np.float32)]
-        _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, self.outputs)))
+        return size, (*size, 3), size
+
+    @functools.cached_property
+    def outputs(self):
+        """[face_id, barycentrics, depth], each [layer, view, ...]"""
+        found = [np.empty(shape, kind) for shape, kind in zip(self._output_shapes, (np.int64, np.float32, np.float32))]
+        _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, found)))
+        return found
 
     def _room(self):
         """({leaf: gradient}, the same as arrays of the library)"""
@@ -48,8 +54,8 @@ class Rasterized:
         return found, _frames.c_arrays([(part.name, found[part.leaf]) for part in self._parts])
 
     def gradients(self, grads):
-        """{leaf: gradient} of sum <grad, output>, by the outputs' names."""
-        named = [(name, np.ascontiguousarray(_arrays.to_numpy(grad), np.float32)) for name, grad in grads.items()
+        """{leaf: gradient} of sum <grad, output>, of the outputs whose grad is not None."""
+        named = [(name, np.ascontiguousarray(_arrays.to_numpy(grad), np.float32)) for name, grad in zip(_NAMES, grads)
                  if grad is not None]
         found, room = self._room()
         _library.call("dpr_frame_samples_backward", self._frame.handle, *_of_layers(named), *room)
@@ -57,11 +63,10 @@ class Rasterized:
 
     def gradients_of_layer(self, layer, grads):
         """The same by the outputs of one layer."""
-        whole = {}
-        for name, output in zip(_NAMES, self.outputs):
-            if grads.get(name) is not None:
-                whole[name] = np.zeros(output.shape, np.float32)
-                whole[name][layer] = _checked(name, grads[name], output.shape[1:])
+        whole = [None if grad is None else np.zeros(shape, np.float32) for grad, shape in zip(grads, self._output_shapes)]
+        for name, grad, of_all in zip(_NAMES, grads, whole):
+            if grad is not None:
+                of_all[layer] = _checked(name, grad, of_all.shape[1:])
         return self.gradients(whole)
 
     def resolve(self, values):
@@ -80,10 +85,10 @@ class Rasterized:
                       _one("grad_images", grad_images), _one("grad_values", grad_values), *room)
         return grad_values, found
 
-
-    def tangents(self, count, given):
-        """Tangents [count, *output.shape] of barycentrics and depth along {leaf: [count, ...]} of arrays that were wanted."""
-        found = [np.empty((count, *output.shape), np.float32) for output in self.outputs[1:]]
+    def tangents(self, given):
+        """Tangents [K, *output.shape] of barycentrics and depth along {leaf: [K, ...]} of arrays that were wanted."""
+        count = len(next(iter(given.values())))
+        found = [np.empty((count, *shape), np.float32) for shape in self._output_shapes[1:]]
         rows = [(name, array.reshape(-1, *array.shape[3:])) for name, array in zip(_NAMES[1:], found)]
         _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *self._moving(count, given),
                       *_frames.c_arrays(rows))
@@ -162,8 +167,8 @@ class Samples:
                    the nearest surfaces, unless this is one of `layers`
     supersampling  samples a pixel and axis; margin: samples around the image, so that h = height supersampling + 2 margin
 
-    With PyTorch, and in reverse mode with JAX, barycentrics, depth and what is made of them have derivatives by vertices,
-    views and intrinsics; with other arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and
+    With PyTorch and JAX barycentrics, depth and what is made of them have derivatives by vertices, views and intrinsics, in
+    reverse and forward mode; with other arrays pullback() and resolve_with_vjp() have them, and in forward mode jvp() and
     resolve_with_jvp(). A gradient goes back like this then:
 
         corners = colors[faces[samples.face_id.clip(0)]]  # [N, h, w, 3, C]
@@ -228,7 +233,7 @@ class Samples:
 
     def _require_numpy(self, function):
         if self._is_of_jax:
-            _arrays.fail(TypeError, function, "samples of JAX", "jax.vjp() and jax.grad() of resolve()", "dpr.Samples")
+            _arrays.fail(TypeError, function, "samples of JAX", "jax.vjp() and jax.jvp() of resolve()", "dpr.Samples")
 
     def _of_my_kind(self, name, array):
         """Floats, as tensors if the samples are. Fails for a tensor whose gradient would be lost."""
@@ -277,19 +282,18 @@ class Samples:
         if not self._rasterized.leaves:
             _arrays.fail(ValueError, "pullback()", "samples of tensors without gradients", "a tensor that requires one",
                          "dpr.Samples")
-        grads = {"barycentrics": barycentrics, "depth": depth}
-        return self._by_name(self._rasterized.gradients_of_layer(self._layer, grads))
+        return self._by_name(self._rasterized.gradients_of_layer(self._layer, (None, barycentrics, depth)))
 
     def jvp(self, tangents: Dict[str, Array]) -> Tuple[Array, Array]:
         """Tangents of barycentrics [K, N, h, w, 3] and depth [K, N, h, w] along K directions at once: forward mode.
 
         tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape]; of
         tensors, of those that required a gradient when rasterize() was called. PyTorch takes its own by torch.func.jvp and
-        torch.autograd.forward_ad, from 2.0 on. The tangent of interpolate(attributes) is interpolate(those of the
-        attributes), plus the attributes of the faces' corners times those of the barycentrics."""
+        torch.autograd.forward_ad, from 2.0 on, and JAX by jax.jvp. The tangent of interpolate(attributes) is
+        interpolate(those of the attributes), plus the attributes of the faces' corners times those of the barycentrics."""
         self._require_numpy("jvp()")
-        count, given = self._moving(tangents)
-        found = self._rasterized.tangents(count, given)
+        _, given = self._moving(tangents)
+        found = self._rasterized.tangents(given)
         return tuple(_arrays.like(self._plan.given[0], tangent[:, self._layer]) for tangent in found)
 
     def resolve_with_jvp(self, values: Array, value_tangents: Optional[Array] = None,

@@ -23,9 +23,9 @@ def _tensor(array):
     return torch.from_dlpack(array)
 
 
-def _gradients(rendered, grads, tensors, wanted):
+def _gradients(rendered, grads, tensors):
     """Gradient of each tensor, None where not wanted."""
-    found = rendered.gradients([None if grad is None else _arrays.to_numpy(grad) for grad in grads], wanted)
+    found = rendered.gradients([None if grad is None else _arrays.to_numpy(grad) for grad in grads])
     return [_tensor(found[i]) if i in found else None for i in range(len(tensors))]
 
 
@@ -73,7 +73,7 @@ class _Gradients(_Derivative):
 
     @staticmethod
     def forward(call, count, *tensors):
-        found = _gradients(call.rendered, tensors[:count], tensors[count:], call.wanted)
+        found = _gradients(call.rendered, tensors[:count], tensors[count:])
         return tuple(gradient for gradient in found if gradient is not None)
 
     @staticmethod
@@ -155,7 +155,7 @@ class _SampleTangents(_Derivative):
     @staticmethod
     def forward(rasterized, numbers, *tensors):
         given = {i: _arrays.to_numpy(tensor) for i, tensor in zip(numbers, tensors)}
-        return tuple(_tensor(found) for found in rasterized.tangents(len(tensors[0]), given))
+        return tuple(_tensor(found) for found in rasterized.tangents(given))
 
     @staticmethod
     def vmap(info, dimensions, rasterized, numbers, *tensors):
@@ -189,7 +189,7 @@ class _SampleGradients(_Derivative):
 
     @staticmethod
     def forward(call, grad_barycentrics, grad_depth, *tensors):
-        found = call.rendered.gradients({"barycentrics": grad_barycentrics, "depth": grad_depth})
+        found = call.rendered.gradients((None, grad_barycentrics, grad_depth))
         return tuple(_tensor(found[i]) for i in call.wanted)
 
 
@@ -342,7 +342,7 @@ def _register():
         """`of`: the numbers of the outputs that have these gradients."""
         all_grads = dict(zip(of, grads))
         rendered = _rendered[int(token)]
-        found = _gradients(rendered, [all_grads.get(i) for i in range(1 + len(rendered.spec.outputs))], tensors, wanted)
+        found = _gradients(rendered, [all_grads.get(i) for i in range(1 + len(rendered.spec.outputs))], tensors)
         return [gradient for gradient in found if gradient is not None]
 
     @fake("dpr::render")
