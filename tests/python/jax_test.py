@@ -140,6 +140,28 @@ class JaxTest(unittest.TestCase):
             with self.assertRaisesRegex(NotImplementedError, "no second derivatives"):
                 second(np.zeros(3, np.float32))
 
+    def test_own_shading_of_lists_of_meshes(self):
+        views, intrinsics = cameras(2)
+        renderer, faces, weights = dpr.Renderer(SIZE, SIZE, blur=0.6), [FACES, SQUARE_FACES], random(2, SIZE, SIZE, 3) - 0.5
+        meshes, colors = [TETRAHEDRON, SQUARE], [random(4, 3, seed=2), random(5, 3, seed=3)]
+
+        def seen(vertices, colors, faces=faces, rows=slice(None)):
+            samples = renderer.rasterize(vertices, faces, views[rows], intrinsics[rows])
+            return (samples.resolve(samples.interpolate(colors)) * weights[rows]).sum()
+
+        given = jax.tree_util.tree_map(jnp.asarray, (meshes, colors))
+        way = jax.tree_util.tree_map(lambda array: random(*array.shape, seed=8) - 0.5, given)
+        gradients = jax.jit(jax.grad(seen, argnums=(0, 1)))(*given)
+        total = sum((np.asarray(gradient, np.float64) * step).sum()
+                    for gradient, step in zip(*map(jax.tree_util.tree_leaves, (gradients, way))))
+        _, tangent = jax.jit(lambda: jax.jvp(seen, given, way))()
+        self.assertAlmostEqual(float(tangent) / total, 1, delta=1e-4)
+        for i in range(2):
+            alone = jax.grad(seen, argnums=(0, 1))(given[0][i], given[1][i], faces[i], slice(i, i + 1))
+            for found, expected in zip((gradients[0][i], gradients[1][i]), alone):
+                self.assertGreater(np.abs(expected).max(), 0)
+                np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+
     def test_converted_arguments(self):
         views, intrinsics = cameras(1)
         renderer, shapes = dpr.Renderer(SIZE, SIZE, **SMOOTH), np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])

@@ -200,6 +200,11 @@ class ListsTest(unittest.TestCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, "view 1"):
                 render()
 
+        flat = {"faces": (VERTICES[1], FACES[1][:3, :2]), "vertices": (VERTICES[1][:3, :2], FACES[1][:1])}
+        for name, (vertices, faces) in flat.items():
+            with self.subTest(name), self.assertRaisesRegex(ValueError, rf"{name} \(view 1\): got \[3, 2\]"):
+                dpr.render([VERTICES[0], vertices], [FACES[0], faces], VIEWS[:2], LENS, width=SIZE, height=SIZE)
+
     def test_what_is_not_finite_is_told_of_its_mesh(self):
         bad = [VERTICES[0], VERTICES[1].copy()]
         bad[1][5] = np.nan

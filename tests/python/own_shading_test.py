@@ -17,7 +17,7 @@ except ImportError:
     torch = None
 
 import dpr
-from scenes import FACES, SIZE, TETRAHEDRON, cameras, random
+from scenes import FACES, SIZE, SQUARE, SQUARE_FACES, TETRAHEDRON, cameras, random
 
 COLORS = random(4, 3, seed=5)
 WEIGHTS = random(2, SIZE, SIZE, 4, seed=3) - 0.5
@@ -139,6 +139,116 @@ class OwnShadingTest(unittest.TestCase):
         faces[1, 0, 1] = -1
         with self.assertRaisesRegex(ValueError, "-1 behind it"):
             RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+
+    def test_lists_of_meshes(self):
+        """As padded arrays have them, and each mesh by itself; gradients are of each mesh's own shape."""
+        meshes = [TETRAHEDRON, SQUARE[:0], 0.8 * SQUARE, TETRAHEDRON], [FACES, FACES[:0], SQUARE_FACES, FACES]
+        views, intrinsics = cameras(4)
+        colors, weights = [random(len(mesh), 3, seed=4) for mesh in meshes[0]], random(4, SIZE, SIZE, 3, seed=3) - 0.5
+        ways = {"vertices": [random(2, *mesh.shape, seed=7) - 0.5 for mesh in meshes[0]], "views": random(2, 4, 4, 4)}
+        padded = [np.stack([np.pad(row, ((0, 5 - len(row)), (0, 0)), constant_values=value) for row in rows])
+                  for rows, value in ((meshes[0], 99), (meshes[1], -1), (colors, 0))]
+
+        def rasterized(vertices, faces, colors, rows=slice(None)):
+            samples = RENDERER.rasterize(vertices, faces, views[rows], intrinsics[rows])
+            values = samples.interpolate(colors)
+            image, resolved = samples.resolve_with_vjp(values)
+            grad_values, by_contours = resolved(weights[rows])
+            corners = samples.pullback(grad_values, grad_values[..., 0])
+            return samples, (values, image), (by_contours, corners)
+
+        samples, found, gradients = rasterized(*meshes, colors)
+        of_padded, expected, gradients_of_padded = rasterized(*padded)
+        np.testing.assert_array_equal(samples.face_id, of_padded.face_id)
+        for array, wanted in zip(found, expected):
+            self.check_close(array, wanted, 1e-6)
+        for gradient, wanted in zip(gradients, gradients_of_padded):
+            for name in ("views", "intrinsics"):
+                self.check_close(gradient[name], wanted[name], 1e-5)
+            for i, mesh in enumerate(meshes[0]):
+                self.assertEqual(gradient["vertices"][i].shape, mesh.shape)
+                np.testing.assert_allclose(gradient["vertices"][i], wanted["vertices"][i, :len(mesh)],
+                                           atol=1e-5 * np.abs(wanted["vertices"]).max())
+        tangents = samples.resolve_with_jvp(found[0], tangents=ways)[1], samples.jvp(ways)[1]
+        for i in (0, 2, 3):
+            row = slice(i, i + 1)
+            alone, (_, image), of_mesh = rasterized(meshes[0][i], meshes[1][i], colors[i], row)
+            self.check_close(found[1][row], image, 1e-6)
+            for gradient, wanted in zip(gradients, of_mesh):
+                self.check_close(gradient["vertices"][i], wanted["vertices"], 1e-5)
+                self.check_close(gradient["views"][row], wanted["views"], 1e-5)
+            of_mesh = {"vertices": ways["vertices"][i], "views": ways["views"][:, row]}
+            wanted = alone.resolve_with_jvp(found[0][row], tangents=of_mesh)[1], alone.jvp(of_mesh)[1]
+            for tangent, own in zip(tangents, wanted):
+                self.check_close(tangent[:, row], own, 1e-5)
+        # Attributes of the corners, which the faces share out among each other.
+        corners = [mesh[own].reshape(-1, 3) for mesh, own in zip(colors, meshes[1])]
+        indices = [np.arange(own.size).reshape(-1, 3) for own in meshes[1]]
+        np.testing.assert_array_equal(samples.interpolate(corners, indices), found[0])
+        with self.assertWarnsRegex(UserWarning, "every triangle was dropped"):
+            nothing = RENDERER.rasterize([SQUARE[:0]] * 2, [FACES[:0]] * 2, views[:2], intrinsics[:2])
+        self.assertTrue(not nothing.mask.any() and (nothing.interpolate([np.zeros((0, 2))] * 2) == 0).all())
+        of_all = RENDERER.rasterize([TETRAHEDRON], [FACES], views, intrinsics)
+        np.testing.assert_array_equal(of_all.face_id, RENDERER.rasterize(TETRAHEDRON, FACES, views, intrinsics).face_id)
+        (gradient,) = of_all.pullback(depth=of_all.depth)["vertices"]
+        self.check_close(gradient, RENDERER.rasterize(TETRAHEDRON, FACES, views, intrinsics).pullback(
+            depth=of_all.depth)["vertices"], 1e-5)
+        self.assertEqual(of_all.interpolate([COLORS]).shape, (*of_all.face_id.shape, 3))
+
+    @unittest.skipUnless(torch, "no PyTorch")
+    def test_lists_of_tensors(self):
+        leaves = [torch.from_numpy(array.copy()).requires_grad_() for array in (TETRAHEDRON, SQUARE[:0], 0.8 * SQUARE)]
+        colors = [torch.from_numpy(random(len(leaf), 3, seed=4)).requires_grad_() for leaf in leaves]
+        faces = [torch.from_numpy(array) for array in (FACES, FACES[:0], SQUARE_FACES)]
+        order, weights = [2, 0, 1, 2], torch.from_numpy(random(4, SIZE, SIZE, 3, seed=3) - 0.5)  # two share their arrays
+        views, intrinsics = map(torch.from_numpy, cameras(4))
+        views.requires_grad_()
+
+        def shown(given, rows=slice(None)):
+            vertices, faces, colors = given
+            samples = RENDERER.rasterize(vertices, faces, views[rows], intrinsics[rows])
+            image = samples.resolve(samples.interpolate(colors))
+            (image * weights[rows]).sum().backward()
+            return image.detach()
+
+        image = shown([[given[i] for i in order] for given in (leaves, faces, colors)])
+        found, tensors = [], [*leaves, *colors, views]
+        for tensor in tensors:
+            found.append(tensor.grad)
+            tensor.grad = None
+        for row, i in enumerate(order):
+            if len(faces[i]):
+                alone = shown([given[i] for given in (leaves, faces, colors)], slice(row, row + 1))
+                self.check_close(image[row:row + 1], alone, 1e-6)
+        for gradient, tensor in zip(found, tensors):
+            if tensor.numel():
+                self.check_close(gradient, tensor.grad, 1e-5)
+            else:
+                self.assertEqual(gradient.shape, tensor.shape)
+
+    def test_what_is_refused_of_lists(self):
+        vertices, faces = [TETRAHEDRON, SQUARE], [FACES, SQUARE_FACES]
+        wrong = SQUARE.copy()
+        wrong[3] = np.nan
+        for given, words in (((vertices, [FACES + 1, SQUARE_FACES]), r"faces\[1\] \(view 0\): got vertex 4"),
+                             ((vertices, [FACES, SQUARE_FACES + 1]), r"faces\[0\] \(view 1\): got vertex 5"),
+                             ((vertices, [FACES, SQUARE_FACES[:3, :2]]), r"faces \(view 1\): got \[3, 2\]"),
+                             (([TETRAHEDRON, wrong], faces), r"vertices\[3\] \(view 1\): got \(nan"),
+                             (([TETRAHEDRON, SQUARE[:3, :2]], [FACES, FACES[:1]]), r"vertices \(view 1\): got \[3, 2\]"),
+                             ((vertices[:1], faces), "vertices .*a list of 2"),
+                             ((np.stack([TETRAHEDRON] * 2), faces), "vertices .*a list of 2")):
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                RENDERER.rasterize(*given, self.views, self.intrinsics)
+        samples = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+        colors = [random(4, 3), random(5, 3)]
+        for given, words in (([colors[:1]], "attributes .*1 meshes, expected a list of 2"),
+                             ([colors[::-1]], r"attributes\[0\] .*\[5, 3\], expected \[V, C\], V: 4"),
+                             ([[colors[0], colors[1][:, :2]]], r"attributes\[1\] .*\[5, 2\], expected \[V, 3\]"),
+                             ([colors, FACES], "faces .*ndarray, expected a list of 2"),
+                             ([colors, [FACES, FACES]], r"faces\[1\] .*\[4, 3\], expected \[5, 3\]"),
+                             ([colors, [FACES + 1, SQUARE_FACES]], r"attributes\[0\] .*indices from 1 to 4")):
+            with self.subTest(words), self.assertRaisesRegex(ValueError, words):
+                samples.interpolate(*given)
 
     def test_layers(self):
         samples = RENDERER.rasterize(*self.arguments(), layers=3)
@@ -289,8 +399,6 @@ class OwnShadingTest(unittest.TestCase):
                 RENDERER.rasterize(*self.arguments(), layers=layers)
         with self.assertRaisesRegex(ValueError, "layers"):
             dpr.Renderer(SIZE, SIZE, layers=2)
-        with self.assertRaisesRegex(ValueError, "a list of 2"):
-            dpr.rasterize([TETRAHEDRON, TETRAHEDRON], [FACES, FACES], self.views, self.intrinsics, width=SIZE, height=SIZE)
 
     @unittest.skipUnless(torch, "no PyTorch")
     def test_what_is_refused_of_tensors(self):

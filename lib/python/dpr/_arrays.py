@@ -95,6 +95,16 @@ def repeated(array, count):
     return np.repeat(to_numpy(array), count, 0)
 
 
+def padded(arrays):
+    """[V_i, ...] of one library as [N, most, ...], with zeros behind; a differentiable function of tensors."""
+    kind = module_of(arrays[0])
+    if kind == "torch":
+        return sys.modules["torch"].nn.utils.rnn.pad_sequence(arrays, batch_first=True)
+    module, most = sys.modules["jax"].numpy if kind == "jax" else np, max(map(len, arrays))
+    rows = arrays if kind == "jax" else map(to_numpy, arrays)
+    return like(arrays[0], module.stack([module.pad(row, ((0, most - len(row)), (0, 0))) for row in rows]))
+
+
 def require_on_cpu(name, array, copy):
     """Fails for memory that OpenCL does not reach, unless it is to be copied."""
     if copy or module_of(array) in ("numpy", "jax"):  # JAX hands copies to what it calls

@@ -16,8 +16,6 @@ NOTHING_RENDERED = ("dpr: every triangle was dropped: outside the image, nearer 
                      "area")
 _OF_OUTPUTS = {"vertices", "views", "intrinsics", "texcoords", "sigma", "gamma", "alpha"}
 """Arrays that outputs beside the image depend on."""
-NO_MESH = [("vertices", np.zeros((1, 3), np.float32)), ("faces", np.zeros((1, 3), np.int64))]
-"""Triangle without area, which is dropped: shows the background of a mesh without faces."""
 _LEAST_WEIGHT, _ROUNDING = 1e-12, 1e-6
 _ELEMENTS = {np.dtype(np.float32): 0, np.dtype(np.int32): 1, np.dtype(np.int64): 2}
 
@@ -75,23 +73,28 @@ def c_arrays(named):
     return slots, len(named)
 
 
-def _in_words_of_arguments(text):
+def _in_words_of_arguments(text, view):
     """An error of the library's arrays as one of the arguments that they are."""
     for array, argument in (("positions", r"vertices[\1]"), ("texels", r"textures, texel \1"),
                             ("texel_opacities", r"textures, alpha of texel \1")):
         text = re.sub(rf"(?<=error: ){array}\[(\d+)\]", argument, text)
-    return text.replace("k_no_texture", "-1")
+    text = text.replace("k_no_texture", "-1")
+    if view is None:
+        return text
+    named = text.replace("(dpr.render)", f"(view {view})").replace("meshes[0]", f"view {view}")
+    return named if named != text else text.replace(": got", f" (view {view}): got", 1)
 
 
 class Frame:
     """A dpr_frame, destroyed with this; not as the process ends, when the driver may be gone."""
 
-    def __init__(self, options, named):
+    def __init__(self, options, named, view=None):
+        """view: number of the only one, of a mesh in a list, for errors"""
         handle = ctypes.c_void_p()
         try:
             _library.call("dpr_frame_render", ctypes.byref(options), *c_arrays(named), ctypes.byref(handle))
         except _library.InvalidArgument as error:
-            raise _library.InvalidArgument(_in_words_of_arguments(str(error))) from None
+            raise _library.InvalidArgument(_in_words_of_arguments(str(error), view)) from None
         self.handle = handle
         weakref.finalize(self, _library.library.dpr_frame_destroy, handle).atexit = False
 
@@ -187,16 +190,13 @@ class Rendered:
         rows = slice(None) if len(group) == len(frames) else group
         has_mesh = any(name == "faces" for name, _ in lot.named)
         options = options_of(self.spec, lot.settings, group[0], lot.names(wanted))
+        named = lot.named if has_mesh else [*lot.named, *_merged.NO_MESH.items()]
         try:
-            frame = Frame(options, lot.named if has_mesh else lot.named + NO_MESH)
-        except _library.InvalidArgument as error:
-            if len(frames) == 1:
+            frame = Frame(options, named, group[0] if len(frames) > 1 else None)
+        except _library.InvalidArgument:
+            if len(group) == 1:
                 raise
-            if len(group) > 1:  # by itself each says what is wrong, or is rendered
-                return [self._render([i], frames, arrays, wanted, raw) for i in group]
-            text, view = str(error), f"view {group[0]}"
-            named = text.replace("(dpr.render)", f"({view})").replace("meshes[0]", view)
-            raise _library.InvalidArgument(named if named != text else text.replace(": got", f" ({view}): got", 1)) from None
+            return [self._render([i], frames, arrays, wanted, raw) for i in group]  # each says what is wrong, or is rendered
         found = {name: array if rows == slice(None) else np.empty_like(array[rows], order="C") for name, array in raw.items()}
         _library.call("dpr_frame_read", frame.handle, *c_arrays(list(found.items())))
         if rows != slice(None):

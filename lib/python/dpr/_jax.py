@@ -10,8 +10,8 @@ from jax.interpreters import ad, batching, mlir
 from . import _arrays, _frames, _samples
 
 
-# Three kinds of pass from a call's arrays to outputs. JAX asks each for the outputs' shapes, and which have derivatives,
-# before it runs: made of (spec, arrays, numbers of the arrays with derivatives).
+# Three kinds of pass from a call's arrays to outputs. Before one runs, JAX asks for the outputs' shapes, and which have
+# derivatives. One that runs is made of (spec, arrays, numbers of the arrays with derivatives).
 
 
 class _Images(_frames.Rendered):

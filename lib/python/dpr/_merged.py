@@ -11,6 +11,8 @@ _OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
 _MOST_PADDING, _SMALL = 2, 4096
 """Times as many faces and vertices, with padding, as the meshes have, beyond so many."""
 _MOST_PIXELS = 1 << 24
+NO_MESH = {"vertices": np.zeros((1, 3), np.float32), "faces": np.zeros((1, 3), np.int64)}
+"""Triangle without area, which is dropped: shows the background of a mesh without faces."""
 
 
 def require_padding(faces):
@@ -29,7 +31,7 @@ def _split(settings):
     return {name: words.split(",") for name, words in (text.split("=") for text in settings)}
 
 
-def _is_regular(mesh):
+def is_regular(mesh):
     """True if arrays are of the sizes that a frame takes, and indices within them: beside others nothing would tell."""
     vertices, faces = mesh["vertices"].size // 3, mesh["faces"].size // 3
     texcoords, textures, materials = mesh.get("texcoords"), _texture_count(mesh), _material_count(mesh)
@@ -39,7 +41,8 @@ def _is_regular(mesh):
     bounds = {"faces": vertices, "face_texcoords": 0 if texcoords is None else texcoords.size // 2,
               "face_textures": textures, "face_materials": materials}
     least = {"face_textures": -1}
-    return ((texcoords is not None) == (textures > 0)
+    return (mesh["vertices"].shape[1:] == mesh["faces"].shape[1:] == (3,)
+            and (texcoords is not None) == (textures > 0)
             and (texcoords is None or texcoords.shape in (((vertices, 2), (faces, 3, 2)) if not by_index else
                                                           ((texcoords.size // 2, 2),)))
             and all(mesh[name].size == size for name, size in sizes.items() if name in mesh)
@@ -53,7 +56,7 @@ def _kind(settings, parts, arrays):
     textures = {name for name in mesh if name.startswith("textures[")}
     lights = {name for name in mesh if name.startswith("lights.")}
     if "faces" not in mesh or not mesh.keys() - textures - lights <= _KNOWN or \
-            any(mesh[name].shape[-1] != 3 for name in textures) or not _is_regular(mesh):
+            any(mesh[name].shape[-1] != 3 for name in textures) or not is_regular(mesh):
         return None
     names = mesh.keys() - textures - {"face_texcoords", "face_textures", "face_materials"}
     of_all = tuple(sorted(part for part in parts if _is_of_all(part.name)))
@@ -132,13 +135,15 @@ class Merged:
 
     def __init__(self, frames, arrays):
         """frames: (settings, parts) of each"""
-        self._views, self._shapes = len(frames), {}
+        self._views = len(frames)
         self._places = []  # (part, name, its place in the array of that name)
-        frames = [(settings, parts, {part.name: part.of(arrays[part.leaf]) for part in parts}) for settings, parts in frames]
+        frames = [(settings, parts, {**NO_MESH, **{part.name: part.of(arrays[part.leaf]) for part in parts}})
+                  for settings, parts in frames]
         self.settings = _settings_of_all(frames)
         meshes = [mesh for _, _, mesh in frames]
         self._vertices = max(mesh["vertices"].size // 3 for mesh in meshes)
         self._faces = max(mesh["faces"].size // 3 for mesh in meshes)
+        self._shapes = {"vertices": (self._views, self._vertices, 3)}
         self._next = {"texcoords": 0, "textures": 0, "materials": 0}
         indices = []
         for view, (_, parts, mesh) in enumerate(frames):
@@ -201,8 +206,8 @@ class Merged:
 
     def _room(self, leaves=None):
         """{name: zeros} of arrays with numbers of these leaves, or of all."""
-        names = dict.fromkeys(name for part, name, _ in self._places if leaves is None or part.leaf in leaves)
-        return {name: np.zeros(self._shapes[name], np.float32) for name in names}
+        return {name: np.zeros(shape, np.float32) for name, shape in self._shapes.items()
+                if leaves is None or any(name == own and part.leaf in leaves for part, own, _ in self._places)}
 
     def names(self, wanted):
         return list(self._room(wanted))

@@ -4,15 +4,16 @@ import numpy as np
 from . import _arrays, _frames
 
 
-def _nested(paths, found):
-    """The gradients at their arguments' paths: names are of dictionaries, numbers of lists, None where there is none."""
+def nested(plan, found):
+    """Gradients {leaf: gradient} as those of what was given, at their arguments' paths: names are of dictionaries, numbers of
+    lists, None where there is none."""
     root = {}
     for leaf, gradient in found.items():
-        *path, last = paths[leaf]
+        *path, last = plan.paths[leaf]
         place = root
         for key in path:
             place = place.setdefault(key, {})
-        place[last] = gradient
+        place[last] = _arrays.restored(plan.given[leaf], gradient)
 
     def listed(place):
         if not isinstance(place, dict):
@@ -100,6 +101,6 @@ def vjp(spec, plan, wrt):
         for leaf, slope in plan.slopes.items():
             if leaf in found:
                 found[leaf] = np.asarray(found[leaf] * slope(), np.float32)
-        return _nested(paths, {leaf: _arrays.restored(plan.given[leaf], gradient) for leaf, gradient in found.items()})
+        return nested(plan, found)
 
     return [_arrays.like(plan.given[0], output) for output in rendered.outputs], pullback, rendered.warning

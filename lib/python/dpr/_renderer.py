@@ -223,11 +223,11 @@ class Renderer:
         found, pullback, warning = _numpy.vjp(spec, plan, wrt)
         return _result(spec, found, warning), pullback
 
-    def rasterize(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *, layers: int = 1,
+    def rasterize(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, layers: int = 1,
                   copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
-        The arguments are those of a call, of one mesh, N shapes, or N padded meshes.
+        The arguments are those of a call: one mesh, N shapes, a list of N meshes, or N padded ones, which share launches.
         layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
@@ -354,7 +354,7 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
     return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
 
 
-def rasterize(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
+def rasterize(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
               copy: bool = False, **settings: Setting) -> Samples:
     """Renderer(width, height, **settings).rasterize(): see there."""
     _plan.require_names(settings, (*_OF_A_RENDERER, "layers", "copy"))

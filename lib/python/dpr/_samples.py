@@ -19,21 +19,14 @@ class Rasterized:
 
     def __init__(self, spec, arrays, wanted):
         """arrays, wanted: as Rendered has them."""
-        (settings, parts), = _frames.frames_of(spec.parts)
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
-        self._parts = [part for part in parts if part.leaf in wanted]
-        self.leaves = [part.leaf for part in self._parts]  # those with derivatives
-        self._shapes = [array.shape for array in arrays]
-        named = _unpadded({part.name: part.of(arrays[part.leaf]) for part in parts})
-        if not any(part.name == "faces" for part in parts):
-            named += _frames.NO_MESH
-        options = _frames.options_of(spec, settings, 0, [part.name for part in self._parts])
-        self._frame = _frames.Frame(options, named)
+        self.leaves, self._shapes = wanted, [array.shape for array in arrays]
+        self._lot, self._frame = _rendered(spec, arrays, wanted)
         # Of a frame that shows nothing.
         self.warning = _frames.NOTHING_RENDERED if self._frame.is_empty() else None
         self.raster = _library.Raster()
         _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
-        count = next(len(array) for name, array in named if name == "views")
+        count = len(dict(self._lot.named)["views"])
         self.size, self._image_size = (count, self.raster.height, self.raster.width), (count, spec.height, spec.width)
 
     @property
@@ -48,18 +41,19 @@ class Rasterized:
         _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, found)))
         return found
 
-    def _room(self):
-        """({leaf: gradient}, the same as arrays of the library)"""
-        found = {part.leaf: np.zeros(self._shapes[part.leaf], np.float32) for part in self._parts}
-        return found, _frames.c_arrays([(part.name, found[part.leaf]) for part in self._parts])
+    def _gradients(self, function, *arguments):
+        """{leaf: gradient} that a function of the library computes."""
+        totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in self.leaves}
+        found = self._lot.gradients(totals)
+        _library.call(function, self._frame.handle, *arguments, *_frames.c_arrays(found))
+        self._lot.add(found, totals)
+        return totals
 
     def gradients(self, grads):
         """{leaf: gradient} of sum <grad, output>, of the outputs whose grad is not None."""
         named = [(name, np.ascontiguousarray(_arrays.to_numpy(grad), np.float32)) for name, grad in zip(_NAMES, grads)
                  if grad is not None]
-        found, room = self._room()
-        _library.call("dpr_frame_samples_backward", self._frame.handle, *_of_layers(named), *room)
-        return found
+        return self._gradients("dpr_frame_samples_backward", *_of_layers(named))
 
     def gradients_of_layer(self, layer, grads):
         """The same by the outputs of one layer."""
@@ -80,9 +74,8 @@ class Rasterized:
         values = _checked("values", values, (*self.size, values.shape[-1]))
         grad_images = _checked("grad_images", grad_images, (*self._image_size, values.shape[-1]))
         grad_values = np.empty(values.shape, np.float32)
-        found, room = self._room()
-        _library.call("dpr_frame_resolve_backward", self._frame.handle, _one("values", values),
-                      _one("grad_images", grad_images), _one("grad_values", grad_values), *room)
+        found = self._gradients("dpr_frame_resolve_backward", _one("values", values), _one("grad_images", grad_images),
+                                _one("grad_values", grad_values))
         return grad_values, found
 
     def tangents(self, given):
@@ -90,7 +83,8 @@ class Rasterized:
         count = len(next(iter(given.values())))
         found = [np.empty((count, *shape), np.float32) for shape in self._output_shapes[1:]]
         rows = [(name, array.reshape(-1, *array.shape[3:])) for name, array in zip(_NAMES[1:], found)]
-        _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *self._moving(count, given),
+        moving = self._moving(count, given)
+        _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
                       *_frames.c_arrays(rows))
         return found
 
@@ -101,31 +95,55 @@ class Rasterized:
         moved = np.zeros((count, *values.shape), np.float32) if value_tangents is None else \
             _checked("tangents of values", value_tangents, (count, *values.shape))
         images = np.empty((count, *self._image_size, values.shape[-1]), np.float32)
-        _library.call("dpr_frame_resolve_tangent", self._frame.handle, count, *self._moving(count, given),
+        moving = self._moving(count, given)
+        _library.call("dpr_frame_resolve_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
                       _one("values", values), _one("value_tangents", moved.reshape(-1, *values.shape[1:])),
                       _one("images", images.reshape(-1, *images.shape[2:])))
         return images
 
     def _moving(self, count, given):
-        given = {leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}
-        return _frames.c_arrays([(part.name, given[part.leaf].reshape(count, -1)) for part in self._parts
-                                 if part.leaf in given])
+        """The frame's arrays of tangents, to keep while the library reads them."""
+        return self._lot.tangents({leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}, count)
 
 
 @functools.lru_cache(maxsize=64)
 def raster_of(spec):
     """The raster of a spec's samples."""
     camera = [("views", np.eye(4, dtype=np.float32)[None]), ("intrinsics", np.ones((1, 4), np.float32))]
-    frame, raster = _frames.Frame(_frames.options_of(spec), camera + _frames.NO_MESH), _library.Raster()
+    frame = _frames.Frame(_frames.options_of(spec), [*camera, *_merged.NO_MESH.items()])
+    raster = _library.Raster()
     _library.call("dpr_frame_raster", frame.handle, ctypes.byref(raster))
     return raster
+
+
+def _rendered(spec, arrays, wanted):
+    """(arrays of one frame, the frame) of all the call's meshes."""
+    def framed(lot, view=None):
+        return _frames.Frame(_frames.options_of(spec, lot.settings, 0, lot.names(wanted)), lot.named, view)
+
+    frames = _frames.frames_of(spec.parts)
+    alone = [_merged.Single(*frame, arrays, True) for frame in frames]
+    for mesh in alone:
+        mesh.named = _unpadded({**_merged.NO_MESH, **dict(mesh.named)})
+    if len(alone) == 1:
+        return alone[0], framed(alone[0])
+    for view, mesh in enumerate(alone):
+        if not _merged.is_regular(dict(mesh.named)):
+            framed(mesh, view)  # is refused
+    lot = _merged.Merged(frames, arrays)
+    try:
+        return lot, framed(lot)
+    except _library.InvalidArgument:
+        for view, mesh in enumerate(alone):  # by itself each says what is wrong
+            framed(mesh, view)
+        raise
 
 
 def _unpadded(arrays):
     """(name, array) pairs in which meshes of a batch, faces [N, F, 3], are padded as frames take them: with faces of one
     vertex, and vertices at the place of the first one."""
-    faces = arrays.get("faces")
-    if faces is None or faces.ndim < 3:
+    faces = arrays["faces"]
+    if faces.ndim < 3:
         return list(arrays.items())
     _merged.require_padding(faces)
     arrays = {**arrays, "faces": faces.clip(0)}
@@ -188,8 +206,10 @@ class Samples:
         self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
         self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
-        self._outputs = outputs
-        self._vertices = next(array.shape[-2] for path, array in zip(plan.paths, plan.given) if path == ("vertices",))
+        self._outputs, self._is_of_list = outputs, ("faces",) not in plan.paths
+        # Of each mesh: numbers of vertices, and the faces' shape.
+        self._meshes = list(zip([array.shape[-2] for array in _of_name(plan, plan.given, "vertices")],
+                                [tuple(array.shape) for array in _of_name(plan, plan.given, "faces")]))
 
     @property
     def _is_of_jax(self):
@@ -209,27 +229,54 @@ class Samples:
     def interpolate(self, attributes: Array, faces: Optional[Array] = None) -> Array:
         """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3], or
         [N, F, 3] as those of rasterize(), indices of the attributes for the corners of the mesh's faces, where they have
-        some of their own. Raises ValueError for other shapes and indices."""
-        attributes = self._of_my_kind("attributes", attributes)
-        rows, least = self._vertices, 0
-        if faces is not None:
-            faces = _arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.Samples")
-            if tuple(faces.shape) != tuple(self._faces.shape):
-                _arrays.fail(ValueError, "faces", list(faces.shape), list(self._faces.shape), "dpr.Samples")
-            rows, least = int(faces.max()) + 1, int((faces.clip(0) if faces.ndim == 3 else faces).min())
-        shape, count = tuple(attributes.shape), len(self.face_id)
-        is_table = len(shape) == 2 or len(shape) == 3 and shape[0] in (1, count)
-        if not is_table or least < 0 or shape[-2] < rows or faces is None and shape[-2] != rows:
-            wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
-            _arrays.fail(ValueError, "attributes", list(shape), f"[V, C] or [{count}, V, C], V: {wanted}", "dpr.Samples")
+        some of their own. Of a list of meshes both are lists too. Raises ValueError for other shapes and indices."""
+        attributes, faces = _arrays.from_numbers(attributes), _arrays.from_numbers(faces, True)
+        if isinstance(attributes, (list, tuple)) and self._is_of_list:
+            attributes, faces = self._tables(attributes, faces)
+        else:
+            most = max(vertices for vertices, _ in self._meshes)
+            attributes, faces = self._table("", attributes, faces, most, tuple(self._faces.shape))
         faces = self._faces if faces is None else faces
-        if 0 in (*faces.shape, shape[-2]):
+        if 0 in (*faces.shape, attributes.shape[-2]):
             return self.barycentrics[..., :1] * attributes.sum(-2)[..., None, None, :]  # 0: there is nothing
-        views = np.arange(count)[:, None, None]
-        corners = faces[views, self.face_id.clip(0)] if faces.ndim == 3 else faces[self.face_id.clip(0)]
-        values = attributes[corners] if len(shape) == 2 else \
+        meshes = np.arange(len(faces))[:, None, None]
+        corners = faces[meshes, self.face_id.clip(0)] if faces.ndim == 3 else faces[self.face_id.clip(0)]
+        values = attributes[corners] if attributes.ndim == 2 else \
             attributes[np.arange(len(attributes))[:, None, None, None], corners]
         return (self.barycentrics[..., None] * values).sum(-2)
+
+    def _table(self, which, attributes, faces, vertices, shape_of_faces):
+        """Attributes and faces, or None, that fit so many vertices, and a mesh's faces; `which` of a list."""
+        attributes = self._of_my_kind("attributes" + which, attributes)
+        rows, least = vertices, 0
+        if faces is not None:
+            faces = _arrays.converted("faces" + which, _arrays.from_numbers(faces, True), True, "dpr.Samples")
+            if tuple(faces.shape) != shape_of_faces:
+                _arrays.fail(ValueError, "faces" + which, list(faces.shape), list(shape_of_faces), "dpr.Samples")
+            bounds = faces.clip(0) if faces.ndim == 3 else faces
+            rows, least = (int(bounds.max()) + 1, int(bounds.min())) if 0 not in shape_of_faces else (0, 0)
+        shape, count = tuple(attributes.shape), len(self.face_id)
+        is_table = len(shape) == 2 or len(shape) == 3 and shape[0] in (1, count) and not which
+        if not is_table or least < 0 or shape[-2] < rows or faces is None and shape[-2] != rows:
+            wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
+            shapes = "[V, C]" if which else f"[V, C] or [{count}, V, C]"
+            _arrays.fail(ValueError, "attributes" + which, list(shape), f"{shapes}, V: {wanted}", "dpr.Samples")
+        return attributes, faces
+
+    def _tables(self, attributes, faces):
+        """The same of lists of meshes, as one array each."""
+        count = len(self._meshes)
+        given = {"attributes": attributes, "faces": [None] * count if faces is None else faces}
+        for name, arrays in given.items():
+            if not isinstance(arrays, (list, tuple)) or len(arrays) != count:
+                got = f"{len(arrays)} meshes" if isinstance(arrays, (list, tuple)) else type(arrays).__name__
+                _arrays.fail(ValueError, name, got, f"a list of {count}, as those of rasterize()", "dpr.Samples")
+        tables, indices = zip(*(self._table(f"[{i}]", *own, *mesh)
+                                for i, (*own, mesh) in enumerate(zip(*given.values(), self._meshes))))
+        for i, table in enumerate(tables):
+            if table.shape[1] != tables[0].shape[1]:
+                _arrays.fail(ValueError, f"attributes[{i}]", list(table.shape), f"[V, {tables[0].shape[1]}]", "dpr.Samples")
+        return _arrays.padded(tables), None if faces is None else _arrays.padded(indices)
 
     def _require_numpy(self, function):
         if self._is_of_jax:
@@ -275,9 +322,9 @@ class Samples:
         return _arrays.like(values, self._rasterized.resolve(kept)), pullback
 
     def pullback(self, barycentrics: Optional[Array] = None, depth: Optional[Array] = None) -> Dict[str, Array]:
-        """Gradients of vertices, views and intrinsics, by name, from those of barycentrics and depth. They leave out how
-        contours move, which resolve_with_vjp() has: add up both, and those of other layers. Of tensors, those that required
-        a gradient when rasterize() was called have one."""
+        """Gradients of vertices (of a list of meshes a list), views and intrinsics, by name, from those of barycentrics and
+        depth. They leave out how contours move, which resolve_with_vjp() has: add up both, and those of other layers. Of
+        tensors, those that required a gradient when rasterize() was called have one."""
         self._require_numpy("pullback()")
         if not self._rasterized.leaves:
             _arrays.fail(ValueError, "pullback()", "samples of tensors without gradients", "a tensor that requires one",
@@ -287,10 +334,10 @@ class Samples:
     def jvp(self, tangents: Dict[str, Array]) -> Tuple[Array, Array]:
         """Tangents of barycentrics [K, N, h, w, 3] and depth [K, N, h, w] along K directions at once: forward mode.
 
-        tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape]; of
-        tensors, of those that required a gradient when rasterize() was called. PyTorch takes its own by torch.func.jvp and
-        torch.autograd.forward_ad, from 2.0 on, and JAX by jax.jvp. The tangent of interpolate(attributes) is
-        interpolate(those of the attributes), plus the attributes of the faces' corners times those of the barycentrics."""
+        tangents: by "vertices", "views" and "intrinsics", how fast each number changes, [K, *the argument's shape], of a list
+        a list; of tensors, of those that required a gradient when rasterize() was called. PyTorch takes its own by
+        torch.func.jvp and torch.autograd.forward_ad, from 2.0 on, and JAX by jax.jvp. The tangent of interpolate(attributes)
+        is interpolate(those of the attributes), plus the attributes of the faces' corners times those of the barycentrics."""
         self._require_numpy("jvp()")
         _, given = self._moving(tangents)
         found = self._rasterized.tangents(given)
@@ -321,28 +368,30 @@ class Samples:
         return len(next(iter(given.values()))), given
 
     def _by_name(self, found):
-        plan = self._plan
-        return {plan.paths[leaf][0]: _arrays.restored(plan.given[leaf], gradient) for leaf, gradient in found.items()}
+        return _numpy.nested(self._plan, found)
+
+
+def _of_name(plan, arrays, name):
+    """Arrays of an argument, among a plan's: one, or as many as there are meshes in a list."""
+    return [array for path, array in zip(plan.paths, arrays) if path[0] == name]
 
 
 def rasterize(spec, plan, copy):
-    """Samples of a call's only mesh."""
-    count = len(_frames.frames_of(spec.parts))
-    if count > 1:
-        _arrays.fail(ValueError, "faces", f"a list of {count}", "one mesh, N shapes, or meshes padded to [N, F, 3]",
-                     "dpr.rasterize")
-    leaves = plan.leaves
+    """Samples of a call's meshes."""
+    leaves, tensors = plan.leaves, None
     kinds = {_arrays.module_of(leaf) for leaf in leaves}
-    faces = next(leaf for path, leaf in zip(plan.paths, leaves) if path == ("faces",))
+    faces = _of_name(plan, leaves, "faces")
     if "torch" in kinds:
         from . import _torch
         rasterized, outputs, tensors = _torch.rasterize(spec, leaves, copy)
-        return Samples(rasterized, outputs, sys.modules["torch"].as_tensor(faces).long(), plan, tensors)
-    if "jax" in kinds:
+        faces = [sys.modules["torch"].as_tensor(own).long() for own in faces]
+    elif "jax" in kinds:
         from . import _jax
-        rasterized, outputs, arrays = _jax.rasterize(spec, leaves)
-        return Samples(rasterized, outputs, sys.modules["jax"].numpy.asarray(faces), plan, arrays)
-    wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
-    rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
-    outputs = [_arrays.like(plan.given[0], output) for output in rasterized.outputs]
-    return Samples(rasterized, outputs, faces, plan, None)
+        rasterized, outputs, tensors = _jax.rasterize(spec, leaves)
+        faces = [sys.modules["jax"].numpy.asarray(own) for own in faces]
+    else:
+        wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
+        rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
+        outputs = [_arrays.like(plan.given[0], output) for output in rasterized.outputs]
+    faces = faces[0] if ("faces",) in plan.paths else _arrays.padded(faces)
+    return Samples(rasterized, outputs, faces, plan, tensors)
