@@ -258,6 +258,29 @@ class ArgumentsTest(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "view 1"):
             dpr.render(*meshes, views, intrinsics, width=SIZE, height=SIZE)
 
+    def test_errors_of_rasterize_name_it(self):
+        views, intrinsics = cameras(2)
+        given = {"vertices": TETRAHEDRON, "faces": FACES, "views": views, "intrinsics": intrinsics}
+        cases = [({"vertices": TETRAHEDRON.astype(int)}, "vertices"), ({"faces": FACES.astype(float)}, "faces"),
+                 ({"faces": FACES[:, :2]}, "faces"), ({"views": views[0, 0]}, "views"),
+                 ({"intrinsics": intrinsics[:, :3]}, "intrinsics"), ({"vertices": np.stack([TETRAHEDRON] * 3)}, "vertices"),
+                 ({"vertices": [TETRAHEDRON], "faces": [FACES, FACES]}, "vertices"), ({"layers": 0}, "layers"),
+                 ({"faces": np.stack([FACES, np.where(FACES == 0, -1, FACES)])}, "faces"), ({"layer": 2}, "name")]
+        of_settings = [({"preset": "gaussian"}, "preset|noise"), ({"width": 16.5}, "width"), ({"blurr": 1}, "name"),
+                       ({"blur": -1}, "blur")]
+        renderer = dpr.Renderer(SIZE, SIZE)
+        calls = [(renderer.rasterize, wrong, name) for wrong, name in cases]
+        calls += [(lambda **given: dpr.rasterize(**{"width": SIZE, "height": SIZE, **given}), *case)
+                  for case in cases + of_settings]
+        for call, wrong, name in calls:
+            with self.subTest(wrong), self.assertRaisesRegex((TypeError, ValueError), rf"{name}.* \(dpr.rasterize\): got"):
+                call(**{**given, **wrong})
+        with self.assertRaisesRegex(ValueError, r"views \(dpr.render\)"):
+            renderer(TETRAHEDRON, FACES, views[0, 0], intrinsics)
+        with self.assertWarns(UserWarning) as told:
+            renderer.rasterize(TETRAHEDRON + np.float32([0, 0, 99]), FACES, views, intrinsics)
+        self.assertEqual(told.filename, __file__)
+
     def test_other_types_are_converted(self):
         views, intrinsics = cameras(1)
         given = {"vertices": TETRAHEDRON, "views": views, "intrinsics": intrinsics, "colors": random(4, 3),

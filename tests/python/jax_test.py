@@ -227,6 +227,8 @@ class JaxTest(unittest.TestCase):
             dpr.render(jnp.zeros((4, 3), int), FACES, views, intrinsics, width=SIZE, height=SIZE)
         with self.assertRaisesRegex(Exception, "expected .*V, 3"):
             dpr.render(jnp.asarray(TETRAHEDRON)[:, 0], FACES, views, intrinsics, width=SIZE, height=SIZE)
+        with self.assertRaisesRegex(Exception, r"\(dpr.rasterize\).* expected .*V, 3"):
+            dpr.rasterize(jnp.asarray(TETRAHEDRON)[:, 0], FACES, views, intrinsics, width=SIZE, height=SIZE)
 
 
 if __name__ == "__main__":

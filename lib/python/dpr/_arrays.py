@@ -1,4 +1,5 @@
 """Arrays of whatever library, which is imported only by those who hand its arrays in."""
+import functools
 import numbers
 import sys
 
@@ -7,6 +8,21 @@ import numpy as np
 
 def fail(error, name, got, expected, where="dpr.render"):
     raise error(f"dpr: error: {name} ({where}): got {got}, expected {expected}")
+
+
+def named(call):
+    """Decorator: errors name the call, dpr.rasterize say, where its arguments are checked as those of dpr.render."""
+    def decorated(function):
+        @functools.wraps(function)
+        def renamed(*arguments, **keywords):
+            try:
+                return function(*arguments, **keywords)
+            except (TypeError, ValueError, RuntimeError) as error:
+                if "(dpr.render)" in str(error):
+                    error.args = (str(error).replace("(dpr.render)", f"({call})"),)
+                raise
+        return renamed
+    return decorated
 
 
 def module_of(array):

@@ -223,6 +223,7 @@ class Renderer:
         found, pullback, warning = _numpy.vjp(spec, plan, wrt)
         return _result(spec, found, warning), pullback
 
+    @_arrays.named("dpr.rasterize")
     def rasterize(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, layers: int = 1,
                   copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
@@ -308,10 +309,7 @@ def _spec_of(device, width, height, texts):
 
 def _checked(name, value):
     """True if a setting is an array, of one number then."""
-    if _arrays.is_array(value):
-        _plan.setting(name, value)
-        return True
-    return False
+    return _arrays.is_array(value) and bool(_plan.setting(name, value))
 
 
 _DEFAULT_BLUR = 1  # pixels, of the preset "pixel"
@@ -354,6 +352,7 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
     return Renderer(width, height, device=device, **settings).vjp(vertices, faces, views, intrinsics, wrt=wrt, **of_call)
 
 
+@_arrays.named("dpr.rasterize")
 def rasterize(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
               copy: bool = False, **settings: Setting) -> Samples:
     """Renderer(width, height, **settings).rasterize(): see there."""

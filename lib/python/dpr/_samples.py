@@ -17,6 +17,7 @@ _NAMES = ("face_id", "barycentrics", "depth")
 class Rasterized:
     """A frame, and what its samples show."""
 
+    @_arrays.named("dpr.rasterize")
     def __init__(self, spec, arrays, wanted):
         """arrays, wanted: as Rendered has them."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
