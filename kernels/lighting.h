@@ -15,6 +15,11 @@
 #define DPR_LIGHTS 0
 #endif
 
+/// What goes before a view's lights.
+static inline global const Environment* environment_of(global const Light* lights) {
+  return (global const Environment*)(lights - DPR_ENVIRONMENT_ROWS);
+}
+
 /// Least base of the highlight, which keeps the logarithm finite.
 #define DPR_LEAST_BASE 1e-30f
 
@@ -74,12 +79,14 @@ typedef struct {
 
 static inline Lit light_point(const LightingParams lp, global const Light* restrict lights, float shininess,
                               Vec3n position, Vec3n normal, float4 eye) {
-  Lit lit = {splat3(lp.ambient), zero3n(), zero3n()};
+  global const Environment* const around = environment_of(lights);
+  Lit lit = {splat3(around->ambient), zero3n(), zero3n()};
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
     realn basis[DPR_HARMONICS];
     harmonic_basis(normal, basis);
 #pragma unroll
-    for (int k = 0; k < DPR_HARMONICS; ++k) lit.factor = mad3n(splat3(lp.harmonics[k]), basis[k], lit.factor);
+    for (int k = 0; k < DPR_HARMONICS; ++k)
+      lit.factor = mad3n(splat3(around->harmonics[k]), basis[k], lit.factor);
   }
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
@@ -166,11 +173,11 @@ static inline PointGradient zero_point_gradient(void) {
 }
 
 /// Adds the gradients through the environment at a point.
-static inline void harmonics_backward(const LightingParams lp, Vec3n normal, Vec3n grad_factor,
+static inline void harmonics_backward(global const Environment* around, Vec3n normal, Vec3n grad_factor,
                                       PointGradient* point) {
   realn grad_basis[DPR_HARMONICS];
 #pragma unroll
-  for (int k = 0; k < DPR_HARMONICS; ++k) grad_basis[k] = dot3n(grad_factor, splat3(lp.harmonics[k]));
+  for (int k = 0; k < DPR_HARMONICS; ++k) grad_basis[k] = dot3n(grad_factor, splat3(around->harmonics[k]));
   point->normal = mad3n(harmonic_basis_backward(normal, grad_basis), (realn)(1.0f), point->normal);
 }
 
@@ -178,7 +185,8 @@ static inline void harmonics_backward(const LightingParams lp, Vec3n normal, Vec
 static inline void light_point_backward(const LightingParams lp, global const Light* restrict lights,
                                         float shininess, float4 eye, Vec3n position, Vec3n normal,
                                         Vec3n grad_factor, Vec3n grad_specular, PointGradient* point) {
-  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) harmonics_backward(lp, normal, grad_factor, point);
+  if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS)
+    harmonics_backward(environment_of(lights), normal, grad_factor, point);
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
     const LightTerm t = light_term(position, normal, eye, lights + l, shininess);

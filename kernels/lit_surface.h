@@ -25,6 +25,12 @@ static inline float4 flat_normal(float4 a, float4 b, float4 c) {
   return (float4)(size > DPR_MIN_LENGTH ? n / size : (float3)(0.0f), size);
 }
 
+/// Where the lights of a face's view begin in the list of all.
+static inline uint first_light(const FrameParams p, const LightingParams lp, uint view_face) {
+  return view_face / p.faces * lp.stride + DPR_ENVIRONMENT_ROWS;
+}
+
+/// `lights` are those of the face's view.
 static inline Surface load_surface(const FrameParams p, const LightingParams lp, uint view_face,
                                    global const ViewParams* restrict views,
                                    global const Light* restrict lights, global const uint4* restrict faces,

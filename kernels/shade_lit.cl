@@ -7,7 +7,7 @@
 /// One work-item per pair, up to p.last_pair. Deterministic. Pairs, fragments and colours as shade_forward,
 /// and
 /// in   views   ViewParams[view]
-/// in   lights  Light[light]
+/// in   lights  Light[view, or none where they share them][row]  an Environment, then the lights
 /// in   faces   uint4[...][face]       vertex indices; those of colours, w = material; those of normals
 /// in   world   float4[view][vertex], then float4[view][normal], which flat shading does not read
 /// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, or that of the lights
@@ -22,6 +22,7 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, glob
                               global const uint* restrict fragment_starts, global float* restrict fragments) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(p.last_pair, pairs[0])) return;
+  lights += first_light(p, lp, pair_face[pair]);
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, colors, world, materials);
   const uint last = fragment_starts[pair + 1];
   for (uint i = fragment_starts[pair]; i < last; i += DPR_WIDTH) {
@@ -86,6 +87,7 @@ kernel void shade_lit_backward(const FrameParams p, const LightingParams lp,
                                global float* restrict grad_pairs) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(p.last_pair, pairs[0])) return;
+  lights += first_light(p, lp, pair_face[pair]);
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, colors, world, materials);
   const uint first = fragment_starts[pair], last = fragment_starts[pair + 1];
   const uint bary1 = DPR_GRAD_PLANE(p, BARY), bary2 = bary1 + p.grad_fragments;
@@ -192,6 +194,7 @@ kernel void shade_lit_backward_lights(
     global float* restrict channels) {
   const uint pair = (uint)get_global_id(0);
   if (pair >= min(p.last_pair, pairs[0])) return;
+  lights += first_light(p, lp, pair_face[pair]);
   const Surface s = load_surface(p, lp, pair_face[pair], views, lights, faces, colors, world, materials);
   LightSums sums = zero_light_sums();
   const uint light = lp.light, last = fragment_starts[pair + 1];

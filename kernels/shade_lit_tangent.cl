@@ -37,7 +37,7 @@ static inline void light_point_rows(const LightingParams lp, global const Light*
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
 #pragma unroll
     for (int k = 0; k < DPR_CHANNELS_AT_ONCE; ++k)
-      harmonics_backward(lp, normal, only3n(base, first + k), point + k);
+      harmonics_backward(environment_of(lights), normal, only3n(base, first + k), point + k);
   }
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
@@ -163,6 +163,7 @@ kernel void shade_lit_tangent(const FrameParams p, const LightingParams lp, cons
   const uint pair = (uint)get_global_id(0);
   if (pair >= p.last_pair) return;
   const uint view_face = pair_face[pair];
+  lights += first_light(p, lp, view_face);
   const Surface s = load_surface(p, lp, view_face, views, lights, faces, colors, world, materials);
   const uint last = fragment_starts[pair + 1], bary = DPR_GRAD_PLANE(p, BARY),
              color = DPR_GRAD_PLANE(p, COLOR), plane = p.grad_fragments;

@@ -92,13 +92,11 @@ typedef struct ClippedFace {
   uint first, unused;
 } ClippedFace;
 
-/// The light that all shading models share.
+/// The lights that all shading models share.
 typedef struct LightingParams {
-  float4 ambient;
-  uint lights, light; /* how many there are; whose gradient is asked for */
+  uint lights, light; /* how many a view has; whose gradient is asked for */
+  uint stride;        /* rows of a view in the list of lights, where each has its own; 0: they share them */
   float shininess;
-  uint unused;
-  float4 harmonics[DPR_HARMONICS]; /* RGB, times the constants of the basis and of the cosine lobe */
 } LightingParams;
 
 /// A light of any kind.
@@ -110,6 +108,13 @@ typedef struct Light {
   float inverse_edge; /* 1 / (cos_inner - cos_outer) */
   uint unused0, unused1;
 } Light;
+
+/// Light from all around. In the list of lights it has the place of DPR_ENVIRONMENT_ROWS of them, in front of a view's.
+typedef struct Environment {
+  float4 ambient;
+  float4 harmonics[DPR_HARMONICS]; /* RGB, times the constants of the basis and of the cosine lobe */
+} Environment;
+#define DPR_ENVIRONMENT_ROWS 2
 
 /// Gradients that shading's backward pass leaves per pair of its corners' colours, and, in scenes with
 /// textures, of their texture coordinates and what levels of detail depend on: [pair][9] each; then, in lit

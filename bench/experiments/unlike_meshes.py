@@ -1,4 +1,5 @@
-"""24 meshes of different topology through the Python package: one call, 24 calls, and 24 shapes of one of them.
+"""24 meshes of different topology through the Python package: one call, 24 calls, and 24 shapes of one of them; and 24 views
+of one mesh, each in lights of its own.
 
     PYTHONPATH=build/release/python /usr/bin/python3 bench/experiments/unlike_meshes.py [FACES ...]
 
@@ -65,8 +66,10 @@ def measure(faces):
     lens, random = dpr.perspective(40, SIZE, SIZE), np.random.default_rng(1)
     renderer, grad = dpr.Renderer(SIZE, SIZE, preset="pixel", blur=0.5), np.ones((COUNT, SIZE, SIZE, 4), np.float32)
 
-    def step(vertices, triangles, views):
-        image, pullback = renderer.vjp(vertices, triangles, views, lens, wrt=["vertices"])
+    lights = {"ambient": 0.4 * random.random((COUNT, 3), np.float32), "point": 1 + random.random((COUNT, 2, 9), np.float32)}
+
+    def step(vertices, triangles, views, **lit):
+        image, pullback = renderer.vjp(vertices, triangles, views, lens, wrt=["vertices", *lit], **lit)
         pullback(grad[:len(image)])
 
     def moved(mesh):
@@ -77,6 +80,9 @@ def measure(faces):
         f"{COUNT} calls": lambda: [step(moved(mesh), own, views[i:i + 1])
                                    for i, (mesh, own) in enumerate(zip(vertices, triangles))],
         "shapes of one mesh": lambda: step(np.stack([moved(vertices[0]) for _ in range(COUNT)]), triangles[0], views),
+        "lit views": lambda: step(moved(vertices[0]), triangles[0], views, lights=lights),
+        f"{COUNT} lit calls": lambda: [step(moved(vertices[0]), triangles[0], views[i:i + 1],
+                                            lights={name: array[i] for name, array in lights.items()}) for i in range(COUNT)],
     }
     if torch:
         ways.update(nvdiffrast_ways(vertices, triangles, views))
@@ -90,8 +96,8 @@ def measure(faces):
                 times[name].append(1e3 * (time.perf_counter() - start))
     medians = {name: statistics.median(of_way) for name, of_way in times.items()}
     mean, listed = statistics.mean(map(len, triangles)), ", ".join(f"{name} {ms:.1f} ms" for name, ms in medians.items())
-    ratios = [medians[one] / medians[f"{COUNT} {many}"] for one, many in (("one call", "calls"), ("ranges", "antialiased images"))
-              if one in medians]
+    pairs = (("one call", "calls"), ("lit views", "lit calls"), ("ranges", "antialiased images"))
+    ratios = [medians[one] / medians[f"{COUNT} {many}"] for one, many in pairs if one in medians]
     print(f"{mean:.0f} faces: {listed}; one over {COUNT}: {', '.join(f'{ratio:.2f}' for ratio in ratios)}", flush=True)
 
 

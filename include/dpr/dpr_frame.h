@@ -32,9 +32,9 @@
  *                                             specular
  *   sigma, gamma, alpha  [] or [1]            instead of the settings'
  *
- * Textures and lights may have a leading dimension of 1. With faces [N, F, 3] each view shows a mesh of its own, at the
- * launches of one. Of fewer faces than others the last are (0, 0, 0), of fewer vertices the last lie where another does.
- * Then vertices are [N, V, 3], colours [N, V, 3] or [N, F, 3], texture coordinates [T, 2] with face_texcoords; those,
+ * Textures may have a leading dimension of 1. So may lights, or one of N: then they are each view's own, as many of a kind
+ * as in the others. With faces [N, F, 3] each view shows a mesh of its own, at the launches of one. Of fewer faces than
+ * others the last are (0, 0, 0), of fewer vertices the last lie where another does. Then vertices are [N, V, 3], colours [N, V, 3] or [N, F, 3], texture coordinates [T, 2] with face_texcoords; those,
  * face_textures and face_materials have N in front, and refer to lists of all meshes. Opacities are refused, and so are
  * outputs with gradients but the image, and uv.
  *

@@ -12,6 +12,7 @@
 #include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "renderer/renderer_impl.hpp"
+#include "renderer/setter_checks.hpp"
 
 namespace dpr::batch {
 namespace {
@@ -43,11 +44,13 @@ View neutral_view() {
 
 /// Smoothing, lights and views, each of which its setter checks against the others. Until all are set some
 /// are those of the renderer's last batch, which need not go with these.
-void upload_settings(Renderer& renderer, std::span<const View> views, const std::optional<Lights>& lights,
+void upload_settings(Renderer& renderer, std::span<const View> views, std::span<const Lights> lights,
                      const Smoothing& smoothing, std::size_t first_view) {
+  Renderer::Impl& m = impl_of(renderer);
   const auto set = [&] {
-    if (renderer.scene().smoothing != smoothing) renderer.set_smoothing(smoothing);
-    if (lights || renderer.scene().lights) renderer.set_lights(lights);
+    if (m.scene.smoothing != smoothing) renderer.set_smoothing(smoothing);
+    for (const Lights& of_view : lights) check_lights(m.scene, m.views, of_view);
+    if (!lights.empty() || m.scene.lights) m.set_lights(lights);
     renderer.set_views(views, first_view);
   };
   try {
@@ -136,8 +139,8 @@ GradientRequest request_of(std::span<const std::string> names, bool with_affine_
 Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const BatchOptions& options)
     : frame_(std::move(pool), make_topology(arrays, options.settings)), wanted_(options.gradients) {
   const RenderSettings settings = with_numbers(options.settings, arrays);
-  const std::optional<Lights> lights = make_lights(arrays, options);
   const std::vector<View> views = make_views(arrays, settings);
+  const std::vector<Lights> lights = make_lights(arrays, options, views.size());
   Renderer& renderer = frame_.renderer();
   make_opaque(renderer);
   upload_settings(renderer, views, lights, settings.smoothing(), options.first_view);
@@ -149,7 +152,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
 
   const auto vertices = require(arrays, "vertices").rows<const glm::vec3>();
   const std::size_t count = renderer.scene().meshes[0].mesh.positions.size();
-  const bool needs_affine = !lights && std::ranges::find(wanted_, "views") != wanted_.end();
+  const bool needs_affine = lights.empty() && std::ranges::find(wanted_, "views") != wanted_.end();
   const bool is_own = vertices.size() > count;
   if (needs_affine) vertices_ = repeated(vertices, is_own, views.size());
   const bool own_shapes = views.size() > 1 && (is_own || needs_affine);

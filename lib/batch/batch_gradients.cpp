@@ -148,6 +148,7 @@ void require_tangent(const NamedArray& tangent, std::size_t directions, std::spa
 
 void Batch::add_gradients(SceneGradient& found, bool is_affine, NamedArrays gradients) {
   for (const NamedArray& gradient : gradients) add_gradient(found, is_affine, gradient);
+  impl_of(frame_.renderer()).grad_lights.clear();  // those of other outputs have none
 }
 
 void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray& gradient) {
@@ -167,7 +168,7 @@ void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray&
     std::ranges::for_each(
         is_affine ? affine_gradients(views, vertices_, positions) : rigid_gradients(views, found), add);
   }
-  for_each_array_of(gradient.name, found, [&](const GradientRow& row, GradientIndex i, GradientArray array) {
+  const auto add_array = [&](const GradientRow& row, GradientIndex i, GradientArray array) {
     if (!exists(row, i, renderer.scene(), views)) return;
     const auto* const* vectors = std::get_if<std::vector<glm::vec3>*>(&array);
     const auto* const* opacities = std::get_if<std::vector<float>*>(&array);
@@ -185,10 +186,17 @@ void Batch::add_gradient(SceneGradient& found, bool is_affine, const NamedArray&
     } else {
       transform_numbers(array, add);
     }
-  });
-  // Vertices that the views share have the sum over the views.
-  if (count != 0 && count != sums.size() &&
-      (gradient.name != "vertices" || count != sums.size() * views.size()))
+  };
+  const bool is_light = gradient.name.starts_with("lights.");
+  Renderer::Impl& m = impl_of(renderer);
+  if (is_light && !m.shade.lights_of_views().empty()) {
+    for (SceneGradient& of_view : m.grad_lights) for_each_array_of(gradient.name, of_view, add_array);
+  } else {
+    for_each_array_of(gradient.name, found, add_array);
+  }
+  // Vertices and lights that the views share have the sum over the views.
+  const bool may_be_shared = is_light || gradient.name == "vertices";
+  if (count != 0 && count != sums.size() && !(may_be_shared && count == sums.size() * views.size()))
     throw InvalidArgument(argument(gradient), text_of(gradient.shape), std::to_string(count) + " numbers");
 }
 

@@ -202,39 +202,50 @@ std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings)
   return views;
 }
 
-std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& options) {
+std::vector<Lights> make_lights(NamedArrays arrays, const BatchOptions& options, std::size_t views) {
   const auto is_light = [](const NamedArray& array) { return array.name.starts_with("lights."); };
   if (!options.is_lit && std::ranges::none_of(arrays, is_light)) return {};
-  Lights lights = options.settings.lights();
-  // [row][number], or a leading dimension of one view before.
-  const auto numbers_of = [&](std::string_view key, std::size_t rows, std::size_t numbers,
-                              const std::string& shape) {
-    const NamedArray* const array = find(arrays, "lights." + std::string(key));
-    if (!array) return std::span<const float>();
-    require_form(*array, Element::float32, {{rows, numbers}, {1, rows, numbers}}, shape);
-    return array->rows<const float>();
+  const auto is_by_view = [&](const NamedArray& array) {
+    return is_light(array) && array.shape.size() > (array.name == "lights.ambient" ? 1U : 2U) &&
+           array.shape[0] > 1;
   };
-  if (const NamedArray* const ambient = find(arrays, "lights.ambient")) {
-    require_form(*ambient, Element::float32, {{3}, {1, 3}}, "[3], or [N, 3] of each view by itself");
-    lights.ambient = ambient->rows<const glm::vec3>()[0];
-  }
-  const std::span<const float> harmonics = numbers_of("harmonics", k_harmonics, 3, "[9, 3]");
-  for (std::size_t i = 0; i < harmonics.size(); i += 3)
-    lights.harmonics.emplace_back(harmonics[i], harmonics[i + 1], harmonics[i + 2]);
+  std::vector<Lights> all(std::ranges::any_of(arrays, is_by_view) ? views : 1, options.settings.lights());
+  using Shapes = std::initializer_list<std::initializer_list<std::size_t>>;
+  // take(lights of a view, its numbers), of an array with a dimension of one view or of all in front, or none.
+  const auto take_each = [&](std::string_view key, Shapes shapes, const std::string& form, const auto& take) {
+    const NamedArray* const array = find(arrays, "lights." + std::string(key));
+    if (!array) return;
+    require_form(*array, Element::float32, shapes,
+                 "[" + form + "], or [" + std::to_string(views) + ", " + form + "] of each view by itself");
+    const std::span<const float> numbers = array->rows<const float>();
+    const std::size_t count = is_by_view(*array) ? numbers.size() / views : numbers.size();
+    for (std::size_t v = 0; v < all.size(); ++v)
+      take(all[v], numbers.subspan(is_by_view(*array) ? v * count : 0, count));
+  };
+  take_each("ambient", {{3}, {1, 3}, {views, 3}}, "3", [](Lights& lights, std::span<const float> numbers) {
+    lights.ambient = {numbers[0], numbers[1], numbers[2]};
+  });
+  take_each("harmonics", {{k_harmonics, 3}, {1, k_harmonics, 3}, {views, k_harmonics, 3}}, "9, 3",
+            [](Lights& lights, std::span<const float> numbers) {
+              for (std::size_t i = 0; i < numbers.size(); i += 3)
+                lights.harmonics.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+            });
   for_each_light_kind([&](auto kind) {
     const std::size_t count = count_numbers(kind);
-    const std::span<const float> numbers =
-        numbers_of(kind.key, k_any, count, "[L, " + std::to_string(count) + "]");
-    auto& list = lights.*kind.lights;
-    list.resize(numbers.size() / count);
-    const float* next = numbers.data();
-    for (auto& light : list) {
-      kind.for_each_member([&](std::string_view key, auto member, auto...) {
-        visit_numbers(key, light.*member, [&](std::string_view, float& number) { number = *next++; });
-      });
-    }
+    const auto take = [&](Lights& lights, std::span<const float> numbers) {
+      auto& list = lights.*kind.lights;
+      list.resize(numbers.size() / count);
+      const float* next = numbers.data();
+      for (auto& light : list) {
+        kind.for_each_member([&](std::string_view key, auto member, auto...) {
+          visit_numbers(key, light.*member, [&](std::string_view, float& number) { number = *next++; });
+        });
+      }
+    };
+    take_each(kind.key, {{k_any, count}, {1, k_any, count}, {views, k_any, count}},
+              "L, " + std::to_string(count), take);
   });
-  return lights;
+  return all;
 }
 
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {

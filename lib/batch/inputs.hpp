@@ -22,8 +22,8 @@ BatchSizes check_sizes(NamedArrays arrays);
 
 /// Affine matrices, projections, and planes around every view's vertices.
 std::vector<View> make_views(NamedArrays arrays, const RenderSettings& settings);
-/// None: colours as they are.
-std::optional<Lights> make_lights(NamedArrays arrays, const BatchOptions& options);
+/// None: colours as they are. One: of all views; else of each of them.
+std::vector<Lights> make_lights(NamedArrays arrays, const BatchOptions& options, std::size_t views);
 /// Texture coordinates, textures and materials of a mesh of so many vertices.
 Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::size_t vertices);
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings);

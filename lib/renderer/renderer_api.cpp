@@ -6,6 +6,7 @@
 #include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
+#include "scene/light_table.hpp"
 #include "scene/see_through.hpp"
 
 namespace dpr {
@@ -53,7 +54,7 @@ void Renderer::set_shapes(std::span<const glm::vec3> positions, std::span<const 
 void Renderer::set_lights(const std::optional<Lights>& lights) {
   impl_->require_scene("Renderer::set_lights");
   check_lights(impl_->scene, impl_->views, lights);
-  impl_->set_lights(lights);
+  impl_->set_lights(span_of(lights));
 }
 
 void Renderer::set_cull(Cull cull) {

@@ -106,7 +106,21 @@ SceneGradient Renderer::Impl::read_gradient() {
   reads.finish();
   SceneGradient gradient = finish_summed_gradients(sums, std::move(by_mesh));
   require_finite(gradient);
+  read_lights_of_views(sums);
   return gradient;
+}
+
+void Renderer::Impl::read_lights_of_views(std::span<const float> sums) {
+  grad_lights.clear();
+  const SumList& list = summed_[SumOf::lights];
+  const std::span<const Lights> lights = shade.lights_of_views();
+  for (std::size_t view = 0; list.channels > 0 && view < lights.size(); ++view) {
+    std::vector<float> own;
+    for (std::size_t c = 0; c < list.channels; ++c)
+      own.push_back(sums[list.first + c * list.segments + view]);
+    read_light_gradients(lights[view], own, grad_lights.emplace_back());
+    require_finite(grad_lights.back());
+  }
 }
 
 std::optional<DeviceGradient> Renderer::Impl::mesh_gradient(const GradientRow& row, std::size_t mesh,
@@ -263,6 +277,7 @@ void Renderer::Impl::sum_gradients() {
   const bool poses = wanted.transform || wanted.camera || wanted.distortion;
   const bool cuts = (wanted.camera || wanted.distortion) && frame.clips != 0 && frame.distorts != 0;
   const bool eye = wanted.camera && shade.lit(), lights = wanted.lights && shade.lit();
+  const std::size_t light_views = std::max<std::size_t>(shade.lights_of_views().size(), 1);
   const bool normals = wanted.transform && shade.lit() && !geometry->given_normals.empty();
   const auto channels = [](bool is_wanted, std::size_t count) { return is_wanted ? count : 0; };
   // In the sampled joint composition the pixels hold what the pairs hold otherwise.
@@ -299,8 +314,8 @@ void Renderer::Impl::sum_gradients() {
        {bin.pairs, channels(eye, 3), views.size(), frame.faces, bin.pair_starts, shade.grad_pairs, pairs,
         shade.first_lit_channel() + DPR_PAIR_EYE}},
       {SumOf::lights,
-       {bin.pairs, channels(lights, shade.light_channel_count()), 1, faces, bin.pair_starts,
-        shade.light_channels, pairs}},
+       {bin.pairs, channels(lights, shade.light_channel_count()), light_views, faces / light_views,
+        bin.pair_starts, shade.light_channels, pairs}},
       {SumOf::normals,
        {views.size() * geometry->given_normals.count, channels(normals, 3),
         views.size() * scene.meshes.size(), 1, view_normal_starts, shade.normal_channels}},
@@ -349,7 +364,8 @@ SceneGradient Renderer::Impl::finish_summed_gradients(std::span<const float> sum
   if (!list(SumOf::normals).empty()) add_normal_gradients(list(SumOf::normals), gradient);
   if (!list(SumOf::materials).empty())
     read_material_gradients(list(SumOf::materials), *geometry, scene, gradient);
-  if (!list(SumOf::lights).empty()) read_light_gradients(*scene.lights, list(SumOf::lights), gradient);
+  if (!list(SumOf::lights).empty() && shade.lights_of_views().empty())
+    read_light_gradients(*scene.lights, list(SumOf::lights), gradient);
   return gradient;
 }
 

@@ -96,7 +96,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void set_shapes(std::span<const glm::vec3> positions, std::span<const glm::vec3> colors);
   void set_cull(Cull cull) noexcept;
   void set(const ArrayRef& at, const ArrayValues& values);
-  void set_lights(const std::optional<Lights>& lights);
+  /// As Shade::prepare() takes them; of every view, before the views are set.
+  void set_lights(std::span<const Lights> lights);
   /// An array of `count` elements from the device, in place: the host's copy stays what it was.
   void take(const ArrayRef& at, std::size_t count, const FloatVectors& from);
   /// Either may be left out, and then is the scene's.
@@ -226,6 +227,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Buffer<float> grad_numbers;               // as GradientMap has them
   std::uint64_t device_gradient_frame = 0;  // the frame of backward_on_device()
   std::optional<GradientMap> gradient_map;  // of the scene and views as they are
+  std::vector<SceneGradient> grad_lights;   // of every view's own lights, after read_gradient()
 
   /// Memory for the gradient of the last frame's images, until the next backward pass, which uses it again.
   Buffer<cl_float4>& room_for_grad_images(std::size_t pixels);
@@ -300,6 +302,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Adds what was summed to the gradients of the meshes' arrays.
   SceneGradient finish_summed_gradients(std::span<const float> sums, SceneGradient gradient = {}) const;
   GradientMap make_gradient_map() const;
+  /// From the sums of all to `grad_lights`.
+  void read_lights_of_views(std::span<const float> sums);
   /// From sums by channel to `grad_materials`.
   void join_material_gradients();
 

@@ -167,7 +167,7 @@ void Renderer::Impl::set_scene(const Scene& wanted, std::size_t views_of_faces) 
     if (!texels) texels.emplace(impl_of(device));
   }
   if (new_geometry.textures.has_opacities() && !texel_opacities) texel_opacities.emplace(impl_of(device));
-  Shade::Lighting lighting = shade.prepare(wanted.lights, is_textured(wanted));
+  Shade::Lighting lighting = shade.prepare(span_of(wanted.lights), is_textured(wanted));
   SmoothingSetting smoothing = prepare(wanted.smoothing, wanted, 1, views_of_faces);
   fill(spare_views_, wanted, new_geometry, std::span(&view, 1), 0);
 
@@ -196,7 +196,7 @@ void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t firs
                                const Smoothing& smoothing, const std::optional<Lights>& lights) {
   check_frame_size(scene, new_views.size(), first_view, geometry->views_of_faces);
   std::optional<Lights> new_lights = lights;
-  Shade::Lighting lighting = shade.prepare(lights, is_textured(scene));
+  Shade::Lighting lighting = shade.prepare(span_of(lights), is_textured(scene));
   SmoothingSetting new_smoothing = prepare(smoothing, scene, new_views.size(), geometry->views_of_faces);
   fill(spare_views_, scene, *geometry, new_views, first_view);
 
@@ -303,8 +303,9 @@ void Renderer::Impl::set_shapes(std::span<const glm::vec3> positions, std::span<
   rendered = false;
 }
 
-void Renderer::Impl::set_lights(const std::optional<Lights>& lights) {
-  std::optional<Lights> new_lights = lights;
+void Renderer::Impl::set_lights(std::span<const Lights> lights) {
+  std::optional<Lights> new_lights;
+  if (!lights.empty()) new_lights = lights.front();
   shade.set(shade.prepare(lights, is_textured(scene)));
   std::swap(scene.lights, new_lights);
   gradient_map.reset();

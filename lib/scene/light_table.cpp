@@ -1,6 +1,7 @@
 #include "scene/light_table.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -78,18 +79,13 @@ cl_uint needs_of(const Lights& lights) {
   return needs;
 }
 
-shared::LightingParams lighting_params(const Lights& lights) {
-  shared::LightingParams params{};
-  params.ambient = to_cl(lights.ambient);
-  params.shininess = lights.shininess;
+std::vector<shared::Light> device_lights(const Lights& lights) {
+  shared::Environment environment{to_cl(lights.ambient), {}};
   const auto constants = harmonic_constants();
   for (std::size_t k = 0; k < lights.harmonics.size(); ++k)
-    params.harmonics[k] = to_cl(constants[k] * glm::dvec3(lights.harmonics[k]));
-  return params;
-}
-
-std::vector<shared::Light> device_lights(const Lights& lights) {
-  std::vector<shared::Light> result;
+    environment.harmonics[k] = to_cl(constants[k] * glm::dvec3(lights.harmonics[k]));
+  const auto rows = std::bit_cast<std::array<shared::Light, DPR_ENVIRONMENT_ROWS>>(environment);
+  std::vector<shared::Light> result(rows.begin(), rows.end());
   for_each_light_kind([&](auto kind) {
     for (const auto& light : lights.*kind.lights) result.push_back(kind.to_device(light));
   });

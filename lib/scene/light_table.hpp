@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -146,10 +147,14 @@ std::string list_of(Kind) {
 /// By its name in files. Throws InvalidArgument for another word, which it calls `argument`.
 Shading parse_shading(const std::string& word, const std::string& argument);
 
+/// One for all views, or none.
+inline std::span<const Lights> span_of(const std::optional<Lights>& lights) {
+  return lights ? std::span(&*lights, 1) : std::span<const Lights>();
+}
+
 /// The bits of DPR_LIGHTS.
 cl_uint needs_of(const Lights& lights);
-/// All but `lights`, which counts those below.
-shared::LightingParams lighting_params(const Lights& lights);
+/// A view's rows in the list of lights: the environment, then the lights.
 std::vector<shared::Light> device_lights(const Lights& lights);
 /// From the sums of the channels: of the environment, then of every light.
 void read_light_gradients(const Lights& lights, std::span<const float> sums, SceneGradient& gradient);

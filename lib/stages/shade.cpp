@@ -20,17 +20,23 @@ void Shade::make_surface() {
   if (!surface) surface.emplace(device_);
 }
 
-Shade::Lighting Shade::prepare(const std::optional<Lights>& lights, bool is_textured) const {
+Shade::Lighting Shade::prepare(std::span<const Lights> lights, bool is_textured) const {
   Lighting prepared;
-  if (!lights) return prepared;
-  const ShadingModel model{lights->shading, needs_of(*lights), is_textured};
+  if (lights.empty()) return prepared;
+  const Lights& first = lights.front();
+  const ShadingModel model{first.shading, needs_of(first), is_textured};
   const bool known = now_.kernels && now_.kernels->model == model;
   prepared.kernels = known ? now_.kernels : std::make_shared<LitShading>(device_, model);
-  prepared.params = lighting_params(*lights);
-  std::vector<shared::Light> values = device_lights(*lights);
-  prepared.params.lights = static_cast<cl_uint>(values.size());
-  if (values.empty()) values.emplace_back();  // never read, but an argument all the same
-  prepared.lights.upload(device_, values);
+  std::vector<shared::Light> rows;
+  for (const Lights& of_view : lights) {
+    const std::vector<shared::Light> own = device_lights(of_view);
+    rows.insert(rows.end(), own.begin(), own.end());
+  }
+  const cl_uint of_view = to_uint(rows.size() / lights.size());
+  const bool is_shared = lights.size() == 1;
+  prepared.params = {of_view - DPR_ENVIRONMENT_ROWS, 0, is_shared ? 0 : of_view, first.shininess};
+  prepared.lights.upload(device_, rows);
+  if (!is_shared) prepared.of_views.assign(lights.begin(), lights.end());
   return prepared;
 }
 

@@ -3,7 +3,9 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "kernels/normals.hpp"
 #include "kernels/shade.hpp"
@@ -62,6 +64,7 @@ class Shade {
     std::shared_ptr<LitShading> kernels;  // none: colours as they are
     shared::LightingParams params{};
     Buffer<shared::Light> lights;
+    std::vector<Lights> of_views;  // none: the views share them
   };
 
   /// Before the first textured scene.
@@ -69,11 +72,14 @@ class Shade {
   /// Of what a scene has not the kernels get null pointers, which they do not read.
   SurfaceArguments arguments(const ShadeInputs& in);
   SurfaceTangentArguments arguments(const ShadeInputs& in, Tangents& tangents);
-  /// Everything about setting the lights that can fail.
-  Lighting prepare(const std::optional<Lights>& lights, bool is_textured) const;
+  /// Everything about setting the lights that can fail. `lights`: none, those of all views, or those of each view, of
+  /// which there are as many of a kind as in the others.
+  Lighting prepare(std::span<const Lights> lights, bool is_textured) const;
   void set(Lighting&& prepared) noexcept { std::swap(now_, prepared); }
   bool lit() const { return now_.kernels != nullptr; }
   std::size_t lights() const { return now_.params.lights; }
+  /// Those of every view by itself; empty where they share them.
+  std::span<const Lights> lights_of_views() const { return now_.of_views; }
   /// Launches that find the lights' gradients: without lights one still finds the environment's.
   std::size_t light_launches() const { return std::max<std::size_t>(lights(), 1); }
   /// The first of the channels of `grad_pairs` that lit scenes have.

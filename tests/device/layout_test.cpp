@@ -111,11 +111,13 @@ std::vector<Entry> entries() {
           DPR_FIELD(ClippedFace, corners),
           DPR_FIELD(ClippedFace, first),
           DPR_SIZE(LightingParams),
-          DPR_FIELD(LightingParams, ambient),
           DPR_FIELD(LightingParams, lights),
           DPR_FIELD(LightingParams, light),
+          DPR_FIELD(LightingParams, stride),
           DPR_FIELD(LightingParams, shininess),
-          DPR_FIELD(LightingParams, harmonics),
+          DPR_SIZE(Environment),
+          DPR_FIELD(Environment, ambient),
+          DPR_FIELD(Environment, harmonics),
           DPR_SIZE(Light),
           DPR_FIELD(Light, position),
           DPR_FIELD(Light, diffuse),
@@ -290,11 +292,11 @@ TEST_SUITE("unit") {
     header.insert(at, "  uint surplus;\n");
     const std::vector<std::string> wrong = differences(header);
     REQUIRE(wrong.size() == 5);
-    CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 192");
-    CHECK(wrong[1] == "offset_of(LightingParams, lights) is 20");
-    CHECK(wrong[2] == "offset_of(LightingParams, light) is 24");
-    CHECK(wrong[3] == "offset_of(LightingParams, shininess) is 28");
-    CHECK(wrong[4] == "offset_of(LightingParams, harmonics) is 48");
+    CHECK(wrong[0] == "(uint)sizeof(LightingParams) is 20");
+    CHECK(wrong[1] == "offset_of(LightingParams, lights) is 4");
+    CHECK(wrong[2] == "offset_of(LightingParams, light) is 8");
+    CHECK(wrong[3] == "offset_of(LightingParams, stride) is 12");
+    CHECK(wrong[4] == "offset_of(LightingParams, shininess) is 16");
   }
 }
 

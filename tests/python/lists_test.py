@@ -51,6 +51,12 @@ VIEWS = np.concatenate([dpr.look_at([np.sin(turn), 0.5, 3 * np.cos(turn)]) for t
 LENS = dpr.perspective(40, SIZE, SIZE)
 LIGHTS = {"ambient": np.float32([0.3, 0.3, 0.3]), "point": np.float32([[1, 2, 4, 0.5, 0.5, 0.5, 0.4, 0.4, 0.4]])}
 
+LIGHTS_OF_VIEWS = {"ambient": 0.4 * random(4, 3), "harmonics": 0.2 * random(4, 9, 3),
+                   "point": random(4, 2, 9) * np.float32([4, 4, 4, 1, 1, 1, 1, 1, 1]), "directional": random(1, 9) - 1,
+                   "spot": np.concatenate([random(4, 1, 3) + 2, -2 - random(4, 1, 3), 20 + 9 * random(4, 1, 1),
+                                           5 + 9 * random(4, 1, 1), random(4, 1, 6)], -1)}
+"""The directional light is that of all views."""
+
 
 def of_each(shape_of, make=random):
     return [make(*shape_of(vertices, faces)) for vertices, faces in MESHES]
@@ -76,6 +82,7 @@ VARIANTS = {
                               **{name: textured()[name] for name in ("materials", "face_materials")}},
     "textures": textured(),
     "textures in the light": {"lights": LIGHTS, "shading": "gouraud", **textured()},
+    "lights of views": {"lights": LIGHTS_OF_VIEWS, "shading": "blinn", "colors": of_each(lambda v, f: (len(v), 3))},
     "near the camera": {"colors": of_each(lambda v, f: (len(v), 3)), "znear": 2.3, "zfar": 3.5},
 }
 
@@ -130,6 +137,53 @@ class ListsTest(unittest.TestCase):
                     for found, other in zip(flat(gradients), flat(of_each_alone)):
                         self.assertEqual(found.shape, other.shape)
                         self.assert_close(found, other, 2e-5, name)
+
+    def test_lights_of_views_share_a_frame(self):
+        """See-through too, and with outputs that have gradients, unlike lists."""
+        mesh = {"vertices": VERTICES[0], "faces": FACES[0]}
+        others = {"views": VIEWS, "intrinsics": LENS, "face_colors": random(len(FACES[0]), 3)}
+        light_of = [{name: array if name == "directional" else array[i]
+                     for name, array in LIGHTS_OF_VIEWS.items()} for i in range(4)]
+        grad = np.sin(np.arange(4 * SIZE * SIZE * 4, dtype=np.float32)).reshape(4, SIZE, SIZE, 4)
+        for case, given, settings in (("opacities", {"opacities": random(len(VERTICES[0]))}, {"sigma": 1e-3}),
+                                      ("opacities", {"opacities": random(len(VERTICES[0]))}, NOISES["pixel"]),
+                                      ("outputs", {"outputs": ["depth"]}, {"sigma": 1e-3})):
+            renderer = dpr.Renderer(SIZE, SIZE, shading="phong", **settings)
+            with self.subTest(case=case), mock.patch.object(_frames, "Frame", wraps=_frames.Frame) as frame:
+                image, pullback = renderer.vjp(**mesh, **others, lights=LIGHTS_OF_VIEWS, **given)
+                self.assertEqual(frame.call_count, 1)
+                found = pullback(grad, **{name: grad[..., 0] for name in given.get("outputs", ())})
+                image = image[0] if "outputs" in given else image
+            total = {name: np.zeros_like(array) for name, array in LIGHTS_OF_VIEWS.items()}
+            vertices = np.zeros_like(VERTICES[0])
+            for i in range(4):
+                own = {**others, "views": VIEWS[i:i + 1]}
+                alone, pullback = renderer.vjp(**mesh, **own, lights=light_of[i], **given)
+                one = grad[i:i + 1]
+                of_view = pullback(one, **{name: one[..., 0] for name in given.get("outputs", ())})
+                self.assert_close(image[i:i + 1], alone[0] if "outputs" in given else alone, 1e-6, case)
+                vertices += of_view["vertices"]
+                for name, array in of_view["lights"].items():
+                    target = total[name] if total[name].shape == array.shape else total[name][i]
+                    target += array
+            self.assert_close(found["vertices"], vertices, 1e-5, case)
+            for name, array in total.items():
+                self.assert_close(found["lights"][name], array, 1e-5, name)
+
+    def test_tangents_in_lights_of_views(self):
+        renderer = dpr.Renderer(SIZE, SIZE, shading="gouraud", sigma=1e-3)
+        given = {"lights": LIGHTS_OF_VIEWS, "colors": random(len(VERTICES[2]), 3)}
+        moved = random(1, *VERTICES[2].shape) - 0.5
+        _, tangent = renderer.jvp(VERTICES[2], FACES[2], VIEWS, LENS, tangents={"vertices": moved}, **given)
+        _, pullback = renderer.vjp(VERTICES[2], FACES[2], VIEWS, LENS, wrt=["vertices"], **given)
+        grad = np.sin(np.arange(tangent.size, dtype=np.float32)).reshape(tangent.shape[1:])
+        self.assert_close(np.sum(tangent[0].astype(np.float64) * grad),
+                          np.sum(pullback(grad)["vertices"].astype(np.float64) * moved[0]), 1e-5, "adjoint")
+
+    def test_lights_of_too_few_views(self):
+        with self.assertRaisesRegex(ValueError, r"lights.point .*got \[3, 2, 9\], expected .*\[4, L, 9\] of each view"):
+            dpr.render(VERTICES[0], FACES[0], VIEWS, LENS, width=SIZE, height=SIZE,
+                       lights={"point": LIGHTS_OF_VIEWS["point"][:3]})
 
     def test_outputs(self):
         outputs = ["face_id", "barycentrics", "effective_faces"]

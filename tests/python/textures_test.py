@@ -274,7 +274,7 @@ class TexturesTest(RenderTest):
             (ValueError, r"materials.shininess .* got \[3\], expected \[2\]",
              {"materials": {"specular": torch.ones(2, 3), "shininess": torch.ones(3)}}),
             (RuntimeError, "shininess of materials.* got 0.5", {"materials": {"shininess": torch.tensor([0.5, 2.0])}}),
-            (ValueError, r"lights.point .* got \[3, 1, 9\], expected 2 in the first",
+            (ValueError, r"lights.point .* got \[3, 1, 9\], expected .*\[2, L, 9\] of each view",
              {"lights": {"point": torch.ones(3, 1, 9)}}),
             (ValueError, r"lights.ambient .* got \[2, 4\]|\[4\], expected \[3\]",
              {"lights": {"ambient": torch.ones(2, 4)}}),

@@ -4,7 +4,7 @@ import numpy as np
 from . import _arrays
 
 _OF_ALL = ("background", "sigma", "gamma", "alpha")
-"""Arrays that are one for all views of a frame, as lights are."""
+"""Arrays that are one for all views of a frame, as lights may be."""
 _KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "texcoords", "face_texcoords", "face_textures",
           "materials.specular", "materials.shininess", "face_materials", *_OF_ALL}
 _OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
@@ -22,8 +22,8 @@ def require_padding(faces):
         _arrays.fail(ValueError, "faces", "-1 in a face before a mesh's last one", "-1 behind it, as padding")
 
 
-def _is_of_all(name):
-    return name in _OF_ALL or name.startswith("lights.")
+def _is_of_all(part):
+    return part.name in _OF_ALL or part.name.startswith("lights.") and part.row is None
 
 
 def _split(settings):
@@ -59,8 +59,9 @@ def _kind(settings, parts, arrays):
             any(mesh[name].shape[-1] != 3 for name in textures) or not is_regular(mesh):
         return None
     names = mesh.keys() - textures - {"face_texcoords", "face_textures", "face_materials"}
-    of_all = tuple(sorted(part for part in parts if _is_of_all(part.name)))
-    return frozenset(_split(settings)), bool(textures), frozenset(names), of_all
+    of_all = tuple(sorted(part for part in parts if _is_of_all(part)))
+    return frozenset(_split(settings)), bool(textures), frozenset(names), of_all, frozenset((name, mesh[name].shape)
+                                                                                            for name in lights)
 
 
 def groups_of(spec, frames, arrays):
@@ -185,12 +186,14 @@ class Merged:
         name, own = part.name, mesh[part.name]
         if name in ("faces", "face_texcoords", "face_textures", "face_materials"):
             return
-        if _is_of_all(name):
+        if _is_of_all(part):
             if view > 0:
                 return
             place, shape = ..., own.shape
         elif name in ("views", "intrinsics"):
             place, shape = view, (self._views, *own.shape[1:])
+        elif name.startswith("lights."):
+            place, shape = view, (self._views, *own.shape)
         elif name in ("vertices", "colors", "face_colors"):
             most = self._faces if name == "face_colors" else self._vertices
             place, shape = (view, slice(0, own.size // 3)), (self._views, most, 3)

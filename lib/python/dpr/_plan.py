@@ -308,8 +308,7 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
         mesh = _lists_of_padded(mesh)
     if isinstance(mesh["faces"], (list, tuple)):
         lists = _lists_of_meshes(mesh, count)
-    elif any(_has_views(texture, 3) for texture in listed(mesh["textures"])) or \
-            any(_has_views(array, _light_dimensions(name)) for name, array in lights_given.items()):
+    elif any(_has_views(texture, 3) for texture in listed(mesh["textures"])):
         lists = _meshes_of_each(mesh, count)
     else:
         lists = None

@@ -139,7 +139,7 @@ class Renderer:
         colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
         may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices [N, V,
         3]. A mesh without faces shows the background. Those of alike sizes share their launches; but see-through ones,
-        outputs with gradients, Monte Carlo, and views with lights by themselves are rendered one after the other.
+        outputs with gradients, and Monte Carlo are rendered one after the other.
 
         Arrays are of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the same, float32;
         nested lists of numbers are NumPy's. float32, int64 and int32 are read where they are, if packed and on the CPU;
