@@ -70,13 +70,11 @@ void require_batch(const NamedArray& array, std::size_t views, std::size_t count
 /// Throws InvalidArgument unless arrays go with faces of every one of `views` views by itself.
 void require_own_arrays(NamedArrays arrays, std::size_t views) {
   for (const NamedArray& array : arrays) {
-    if (array.name == "opacities" || array.name == "face_opacities" ||
-        (array.name.starts_with(k_texture) && has_alpha(array)))
-      throw InvalidArgument(argument(array), "opacities beside faces of every view by itself",
-                            "meshes that are opaque, or one after the other");
-    static constexpr std::array<std::string_view, 4> k_by_view{"faces", "vertices", "colors", "face_colors"};
+    static constexpr std::array<std::string_view, 6> k_by_view{"faces",       "vertices",  "colors",
+                                                               "face_colors", "opacities", "face_opacities"};
     if (std::ranges::find(k_by_view, array.name) == k_by_view.end()) continue;
-    if (array.shape.size() != 3 || array.shape[0] != views)
+    const std::size_t dimensions = array.name.ends_with("opacities") ? 2 : 3;
+    if (array.shape.size() != dimensions || array.shape[0] != views)
       throw InvalidArgument(argument(array), text_of(array.shape),
                             "[" + std::to_string(views) + ", ...], as faces are of every view by itself");
   }

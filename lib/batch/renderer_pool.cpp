@@ -77,7 +77,10 @@ void Topology::set(Renderer& renderer) const {
   add_surface(mesh, surface);
   scene.meshes.push_back({std::move(mesh)});
   if (views_of_faces == 1) return renderer.set_scene(scene);
+  std::vector<float>& of_vertices = scene.meshes[0].mesh.vertex_opacities;
+  std::vector<float> of_all_views = std::exchange(of_vertices, {});  // more than a mesh has
   validate(scene);
+  std::swap(of_vertices, of_all_views);
   impl_of(renderer).set_scene(scene, views_of_faces);
 }
 

@@ -46,12 +46,17 @@ std::vector<TextureForm> texture_forms(NamedArrays arrays, const RenderSettings&
   return forms;
 }
 
-/// The number of opacities of that name; 0 without.
-std::size_t count_opacities(NamedArrays arrays, std::string_view name, std::size_t count) {
+/// The number of opacities of that name, `count` for each view with faces of its own; 0 without.
+std::size_t count_opacities(NamedArrays arrays, std::string_view name, std::size_t views, std::size_t count) {
   const NamedArray* const opacities = find(arrays, name);
   if (!opacities) return 0;
-  require_floats(*opacities, {count}, "[" + std::to_string(count) + "]");
-  return count;
+  const std::string of_view = std::to_string(count) + "]";
+  if (views > 1) {
+    require_floats(*opacities, {views, count}, "[" + std::to_string(views) + ", " + of_view);
+  } else {
+    require_floats(*opacities, {count}, "[" + of_view);
+  }
+  return views * count;
 }
 
 /// Texture coordinates and what refers to them: of vertices, of corners, or by indices.
@@ -129,8 +134,8 @@ Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::si
                           has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
   }
   surface.materials = count_materials(arrays);
-  surface.vertex_opacities = count_opacities(arrays, "opacities", vertices);
-  surface.face_opacities = count_opacities(arrays, "face_opacities", sizes.count);
+  surface.vertex_opacities = count_opacities(arrays, "opacities", sizes.views, vertices);
+  surface.face_opacities = count_opacities(arrays, "face_opacities", sizes.views, sizes.count);
   if (surface.vertex_opacities > 0 && surface.face_opacities > 0)
     throw InvalidArgument("opacities (batch)", "opacities and face_opacities", "one of them");
   surface.face_textures = read_of_faces(arrays, "face_textures", sizes, -1);

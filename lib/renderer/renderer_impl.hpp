@@ -86,8 +86,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   /// The setters' arguments are checked already.
   /// `views_of_faces`: above 1, the faces of the scene, of one mesh then, are those of so many views, as many of each,
-  /// one view after the other. All frames have these views, with shapes of their own, and colours where faces have
-  /// none. Such a mesh gives neither normals nor opacities.
+  /// one view after the other, and so are opacities of vertices. All frames have these views, with shapes of their own,
+  /// and colours where faces have none. Such a mesh gives no normals.
   void set_scene(const Scene& scene, std::size_t views_of_faces = 1);
   void set_views(std::span<const View> views, std::size_t first_view);
   /// All that depends on each other in one step: none need suit what was there of the others.

@@ -295,9 +295,10 @@ void Geometry::add_opacities(Device::Impl& device, const Scene& scene, std::vect
       for (const float opacity : mesh_opacities(mesh)) values.push_back(to_cl(glm::vec3(opacity, 0, 0)));
     }
     const std::size_t first = meshes[scene.meshes[m].instance_of.value_or(m)].first_opacity;
+    const std::size_t of_view = has_own_faces() && !mesh.vertex_opacities.empty() ? vertices : 0;
     for (std::size_t face = 0; face < mesh.faces.size(); ++face)
-      all_faces.push_back(corner_elements(mesh, face, first, !mesh.vertex_opacities.empty(),
-                                          !mesh.face_opacities.empty(), 0));
+      all_faces.push_back(corner_elements(mesh, face, first + face / faces * of_view,
+                                          !mesh.vertex_opacities.empty(), !mesh.face_opacities.empty(), 0));
   }
   opacities.values.upload(device, values);
   opacities.corners = make_incidence(device, std::span(all_faces).subspan(opacity_faces), values.size());

@@ -1,4 +1,4 @@
-// Views with faces of their own in one frame: images and gradients are those of a frame for each.
+// Views with faces and lights of their own in one frame: images and gradients are those of a frame for each.
 #include <doctest/doctest.h>
 
 #include <array>
@@ -88,27 +88,48 @@ std::vector<Vector> padded(std::vector<Vector> list, std::size_t count, const Ve
   return list;
 }
 
+/// A point light of each view, [1][9].
+void add_lights(Arrays& arrays, std::size_t first, std::size_t count) {
+  std::vector<float> lights;
+  for (std::size_t v = first; v < first + count; ++v) {
+    const auto k = static_cast<float>(v);
+    lights.insert(lights.end(), {1 + 2 * k, 3, 2 - k, 0.5F, 0.3F + 0.4F * k, 0.6F, 0.4F, 0.2F, 0.3F});
+  }
+  arrays.add("lights.point", {count, 1, 9}, std::move(lights));
+}
+
 struct Found {
-  std::vector<float> image, vertices, colors;
+  std::vector<float> image, vertices, colors, lights, opacities;
 };
 
-Found rendered(const Arrays& arrays, const RenderSettings& settings, bool is_lit, std::size_t views,
+Found rendered(const Arrays& arrays, const RenderSettings& settings, std::size_t views,
                std::size_t vertices) {
   const auto side = static_cast<std::size_t>(settings.width());
-  Batch batch(RendererPools::of_process().get(""), arrays.named,
-              {settings, is_lit, 0, {"vertices", "colors"}});
+  const bool is_lit = find(arrays.named, "lights.point"), fades = find(arrays.named, "opacities");
+  std::vector<std::string> wanted{"vertices", "colors"};
+  if (is_lit) wanted.emplace_back("lights.point");
+  if (fades) wanted.emplace_back("opacities");
+  Batch batch(RendererPools::of_process().get(""), arrays.named, {settings, is_lit, 0, wanted});
   Found found;
   found.image.resize(views * side * side * 4);
   batch.read(
       std::vector<NamedArray>{{"image", found.image.data(), Element::float32, {views, side, side, 4}}});
   std::vector<float> grad(found.image.size());
   for (std::size_t i = 0; i < grad.size(); ++i)
-    grad[i] = std::sin(static_cast<float>(i % (side * side * 4)));  // the same of every view
+    grad[i] = 0.5F + std::sin(static_cast<float>(i % (side * side * 4)));  // the same of every view
   found.vertices.resize(views * vertices * 3);
   found.colors = found.vertices;
   const std::vector<std::size_t> shape{views, vertices, 3};
-  const std::vector<NamedArray> gradients{{"vertices", found.vertices.data(), Element::float32, shape},
-                                          {"colors", found.colors.data(), Element::float32, shape}};
+  std::vector<NamedArray> gradients{{"vertices", found.vertices.data(), Element::float32, shape},
+                                    {"colors", found.colors.data(), Element::float32, shape}};
+  if (is_lit) {
+    found.lights.resize(views * 9);
+    gradients.push_back({"lights.point", found.lights.data(), Element::float32, {views, 1, 9}});
+  }
+  if (fades) {
+    found.opacities.resize(views * vertices);
+    gradients.push_back({"opacities", found.opacities.data(), Element::float32, {views * vertices}});
+  }
   batch.backward(std::vector<NamedArray>{{"image", grad.data(), Element::float32, {views, side, side, 4}}},
                  gradients);
   return found;
@@ -125,7 +146,7 @@ double difference(std::span<const float> found, std::span<const float> expected)
   return largest / scale;
 }
 
-void check(const std::vector<std::string>& texts, bool is_lit) {
+void check(const std::vector<std::string>& texts, bool is_lit, bool fades = false) {
   const int side = reduced(24, 10);
   const RenderSettings settings = settings_from_texts(side, side, texts);
   const std::array<Mesh, k_views> list = meshes();
@@ -135,18 +156,27 @@ void check(const std::vector<std::string>& texts, bool is_lit) {
   REQUIRE(list[0].faces.size() != list[1].faces.size());
   Arrays together;
   std::vector<glm::vec3> positions, colors;
+  std::vector<float> opacities;
   std::vector<glm::uvec3> faces;
+  const auto opacities_of = [](const Mesh& mesh) {
+    std::vector<float> all;
+    for (const glm::vec3& color : mesh.vertex_colors) all.push_back(color.x);
+    return all;
+  };
   for (const Mesh& mesh : list) {
     const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
     append(positions, padded(mesh.positions, most_vertices, mesh.positions[0]));
     append(colors, padded(mesh.vertex_colors, most_vertices, glm::vec3(0)));
+    append(opacities, padded(opacities_of(mesh), most_vertices, 1.0F));
     append(faces, padded(mesh.faces, most_faces, glm::uvec3(0)));
   }
   together.add("vertices", {k_views, most_vertices, 3}, numbers(positions));
   together.add("faces", {k_views, most_faces, 3}, numbers(faces));
   together.add("colors", {k_views, most_vertices, 3}, numbers(colors));
   add_cameras(together, 0, k_views, static_cast<float>(side));
-  const Found found = rendered(together, settings, is_lit, k_views, most_vertices);
+  if (fades) together.add("opacities", {k_views, most_vertices}, opacities);
+  if (is_lit) add_lights(together, 0, k_views);
+  const Found found = rendered(together, settings, k_views, most_vertices);
   for (std::size_t v = 0; v < k_views; ++v) {
     const Mesh& mesh = list[v];
     const std::size_t count = mesh.positions.size();
@@ -155,7 +185,9 @@ void check(const std::vector<std::string>& texts, bool is_lit) {
     alone.add("faces", {mesh.faces.size(), 3}, numbers(mesh.faces));
     alone.add("colors", {1, count, 3}, numbers(mesh.vertex_colors));
     add_cameras(alone, v, 1, static_cast<float>(side));
-    const Found expected = rendered(alone, settings, is_lit, 1, count);
+    if (fades) alone.add("opacities", {count}, opacities_of(mesh));
+    if (is_lit) add_lights(alone, v, 1);
+    const Found expected = rendered(alone, settings, 1, count);
     CAPTURE(v);
     const auto of_view = [&](const std::vector<float>& all) {
       return std::span(all).subspan(v * all.size() / k_views);
@@ -163,6 +195,8 @@ void check(const std::vector<std::string>& texts, bool is_lit) {
     CHECK(difference(of_view(found.image), expected.image) < 1e-6);
     CHECK(difference(of_view(found.vertices), expected.vertices) < 1e-5);
     CHECK(difference(of_view(found.colors), expected.colors) < 1e-5);
+    if (is_lit) CHECK(difference(of_view(found.lights), expected.lights) < 1e-5);
+    if (fades) CHECK(difference(of_view(found.opacities), expected.opacities) < 1e-5);
   }
 }
 
@@ -170,11 +204,12 @@ void check(const std::vector<std::string>& texts, bool is_lit) {
 
 TEST_SUITE("pipeline") {
   TEST_CASE("own faces: a view shows its mesh as a frame of its own does") {
-    check({"preset=pixel", "sigma=1e-2"}, false);
+    check({"preset=pixel", "sigma=1e-2"}, false, true);
     check({"preset=pixel", "sigma=1e-2", "shading=flat", "znear=2.1", "zfar=3.1"}, true);  // both planes cut
     check({"preset=joint_gaussian", "sigma=1e-3", "gamma=0.05", "shading=gouraud"}, true);
     if (dpr::test::is_reduced()) return;
-    check({"preset=gaussian", "sigma=1e-3", "gamma=0.05"}, false);
+    check({"preset=pixel", "sigma=1e-2"}, false);
+    check({"preset=gaussian", "sigma=1e-3", "gamma=0.05"}, true, true);
     check({"preset=joint_gaussian", "sigma=1e-3", "gamma=0.05", "znear=2.1", "zfar=3.1"}, false);
   }
 }

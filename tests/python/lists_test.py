@@ -83,6 +83,10 @@ VARIANTS = {
     "textures": textured(),
     "textures in the light": {"lights": LIGHTS, "shading": "gouraud", **textured()},
     "lights of views": {"lights": LIGHTS_OF_VIEWS, "shading": "blinn", "colors": of_each(lambda v, f: (len(v), 3))},
+    "opacities of vertices": {"opacities": of_each(lambda v, f: (len(v),)), "colors": of_each(lambda v, f: (len(v), 3))},
+    "opacities of faces": {"face_opacities": of_each(lambda v, f: (len(f),)), "face_colors": of_each(lambda v, f: (len(f), 3))},
+    "see-through textures": {**textured(), "textures": [[random(5, 4, 4)], [random(3, 7, 4), random(2, 2, 3)],
+                                                        [random(6, 6, 4)], [random(4, 4, 4)]]},
     "near the camera": {"colors": of_each(lambda v, f: (len(v), 3)), "znear": 2.3, "zfar": 3.5},
 }
 
@@ -196,16 +200,22 @@ class ListsTest(unittest.TestCase):
         self.assertEqual(rendered({}, "pixel", True, ["depth"])[3], 4)
 
     def test_tangents(self):
-        colors = VARIANTS["colours of vertices"]["colors"]
         tangents = {"vertices": [random(2, *vertices.shape) for vertices in VERTICES], "views": random(2, 4, 4, 4)}
         for noise in NOISES:
             renderer = dpr.Renderer(SIZE, SIZE, **NOISES[noise])
-            _, moved = renderer.jvp(VERTICES, FACES, VIEWS, LENS, colors=colors, tangents=tangents)
-            for i, (vertices, faces) in enumerate(MESHES):
-                of_mesh = {"vertices": tangents["vertices"][i], "views": tangents["views"][:, i:i + 1]}
-                _, alone = renderer.jvp(vertices, faces, VIEWS[i:i + 1], LENS, colors=colors[i], tangents=of_mesh)
-                self.assertGreater(np.abs(alone).max(), 1e-3)
-                self.assert_close(moved[:, i:i + 1], alone, 1e-5, noise)
+            for variant in ("colours of vertices", "opacities of vertices", "opacities of faces"):
+                given = VARIANTS[variant]
+                own = {name: [random(2, *array.shape) for array in arrays] for name, arrays in given.items()}
+                with mock.patch.object(_frames, "Frame", wraps=_frames.Frame) as frame:
+                    _, moved = renderer.jvp(VERTICES, FACES, VIEWS, LENS, **given, tangents={**tangents, **own})
+                    self.assertEqual(frame.call_count, 1)
+                for i, (vertices, faces) in enumerate(MESHES):
+                    of_mesh = {"vertices": tangents["vertices"][i], "views": tangents["views"][:, i:i + 1],
+                               **{name: arrays[i] for name, arrays in own.items()}}
+                    _, alone = renderer.jvp(vertices, faces, VIEWS[i:i + 1], LENS, tangents=of_mesh,
+                                            **{name: arrays[i] for name, arrays in given.items()})
+                    self.assertGreater(np.abs(alone).max(), 1e-3)
+                    self.assert_close(moved[:, i:i + 1], alone, 1e-5, noise)
 
     def test_groups(self):
         def groups(sizes, **arguments):
@@ -234,13 +244,14 @@ class ListsTest(unittest.TestCase):
         small, large = 3, 2  # meshes by their size
         cases = {"faces": ("faces", np.where(FACES[small] == 0, len(VERTICES[small]), FACES[small])),
                  "colors": ("colors", random(len(VERTICES[small]) + 1, 3)), "few colors": ("colors", random(3, 3)),
+                 "opacities": ("opacities", random(len(VERTICES[small]) + 1)),
                  "texcoords": ("texcoords", random(len(VERTICES[small]) - 1, 2)),
                  "face_textures": ("face_textures", np.ones(len(FACES[small]), np.int64)),
                  "face_materials": ("face_materials", np.full(len(FACES[small]), 2)),
                  "face_texcoords": ("face_texcoords", np.full((len(FACES[small]), 3), len(VERTICES[small])))}
         for name, (array, wrong) in cases.items():
             meshes = {"faces": list(FACES), **{key: list(given[key]) for key in given if key not in ("filter", "colors")}}
-            meshes["colors"] = list(VARIANTS["colours of vertices"]["colors"])
+            meshes.update({name: list(arrays) for name, arrays in VARIANTS["opacities of vertices"].items()})
             meshes["face_texcoords"][small] = FACES[small]
             renderer = dpr.Renderer(SIZE, SIZE)
             order = [large, small]

@@ -5,8 +5,8 @@ from . import _arrays
 
 _OF_ALL = ("background", "sigma", "gamma", "alpha")
 """Arrays that are one for all views of a frame, as lights may be."""
-_KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "texcoords", "face_texcoords", "face_textures",
-          "materials.specular", "materials.shininess", "face_materials", *_OF_ALL}
+_KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "opacities", "face_opacities", "texcoords",
+          "face_texcoords", "face_textures", "materials.specular", "materials.shininess", "face_materials", *_OF_ALL}
 _OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
 _MOST_PADDING, _SMALL = 2, 4096
 """Times as many faces and vertices, with padding, as the meshes have, beyond so many."""
@@ -36,8 +36,9 @@ def is_regular(mesh):
     vertices, faces = mesh["vertices"].size // 3, mesh["faces"].size // 3
     texcoords, textures, materials = mesh.get("texcoords"), _texture_count(mesh), _material_count(mesh)
     by_index = "face_texcoords" in mesh
-    sizes = {"colors": 3 * vertices, "face_colors": 3 * faces, "face_texcoords": 3 * faces, "face_textures": faces,
-             "face_materials": faces, "materials.specular": 3 * materials, "materials.shininess": materials}
+    sizes = {"colors": 3 * vertices, "face_colors": 3 * faces, "opacities": vertices, "face_opacities": faces,
+             "face_texcoords": 3 * faces, "face_textures": faces, "face_materials": faces,
+             "materials.specular": 3 * materials, "materials.shininess": materials}
     bounds = {"faces": vertices, "face_texcoords": 0 if texcoords is None else texcoords.size // 2,
               "face_textures": textures, "face_materials": materials}
     least = {"face_textures": -1}
@@ -55,13 +56,13 @@ def _kind(settings, parts, arrays):
     mesh = {part.name: part.of(arrays[part.leaf]) for part in parts}
     textures = {name for name in mesh if name.startswith("textures[")}
     lights = {name for name in mesh if name.startswith("lights.")}
-    if "faces" not in mesh or not mesh.keys() - textures - lights <= _KNOWN or \
-            any(mesh[name].shape[-1] != 3 for name in textures) or not is_regular(mesh):
+    if "faces" not in mesh or not mesh.keys() - textures - lights <= _KNOWN or not is_regular(mesh):
         return None
     names = mesh.keys() - textures - {"face_texcoords", "face_textures", "face_materials"}
     of_all = tuple(sorted(part for part in parts if _is_of_all(part)))
-    return frozenset(_split(settings)), bool(textures), frozenset(names), of_all, frozenset((name, mesh[name].shape)
-                                                                                            for name in lights)
+    most_channels = max((mesh[name].shape[-1] for name in textures), default=0)  # a fourth is opacity
+    return frozenset(_split(settings)), most_channels, frozenset(names), of_all, frozenset((name, mesh[name].shape)
+                                                                                           for name in lights)
 
 
 def groups_of(spec, frames, arrays):
@@ -194,9 +195,9 @@ class Merged:
             place, shape = view, (self._views, *own.shape[1:])
         elif name.startswith("lights."):
             place, shape = view, (self._views, *own.shape)
-        elif name in ("vertices", "colors", "face_colors"):
-            most = self._faces if name == "face_colors" else self._vertices
-            place, shape = (view, slice(0, own.size // 3)), (self._views, most, 3)
+        elif name in ("vertices", "colors", "face_colors", "opacities", "face_opacities"):
+            most, per_row = self._faces if name.startswith("face_") else self._vertices, 1 if name.endswith("opacities") else 3
+            place, shape = (view, slice(0, own.size // per_row)), (self._views, most) + (per_row,) * (per_row > 1)
         elif name.startswith("textures["):
             name, place, shape = f"textures[{self._next['textures'] + int(name[9:-1])}]", ..., own.shape
         else:
