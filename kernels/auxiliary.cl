@@ -96,7 +96,7 @@ kernel void auxiliary_weigh(const FrameParams p, global const float* restrict ou
 /// in   outputs    float[DPR_AUXILIARY_CHANNELS][sample]  as auxiliary_forward
 /// in   face_id    uint[sample]                           as auxiliary_forward
 /// in   surface, coverage  float4[pixel]  as auxiliary_weigh, blurred
-/// in   texcoord_of  uint[face * 3 + corner]
+/// in   texcoord_of  uint[row of the face * 3 + corner]
 /// in   texcoords    float2[...]
 /// out  normals    float4[pixel]  the normal; w = depth
 /// out  places     float4[pixel]  barycentrics, 0 on the background; w = the effective number of faces
@@ -130,8 +130,9 @@ kernel void auxiliary_finish(const FrameParams p, const uint4 image, const uint 
                 b2 = outputs[(DPR_AUXILIARY_BARYCENTRICS + 1) * samples + sample];
     place = (float3)(1.0f - b1 - b2, b1, b2);
     if (has_uv) {
-      uv = place.x * texcoords[texcoord_of[3 * face]] + place.y * texcoords[texcoord_of[3 * face + 1]] +
-           place.z * texcoords[texcoord_of[3 * face + 2]];
+      texcoord_of += 3 * (first_row(p, i / pixels) + face);
+      uv = place.x * texcoords[texcoord_of[0]] + place.y * texcoords[texcoord_of[1]] +
+           place.z * texcoords[texcoord_of[2]];
     }
   }
   normals[i] = normal;

@@ -35,8 +35,7 @@
  * Textures may have a leading dimension of 1. So may lights, or one of N: then they are each view's own, as many of a kind
  * as in the others. With faces [N, F, 3] each view shows a mesh of its own, at the launches of one. Of fewer faces than
  * others the last are (0, 0, 0), of fewer vertices the last lie where another does. Then vertices are [N, V, 3], colours [N, V, 3] or [N, F, 3], opacities [N, V] or [N, F], texture coordinates [T, 2]
- * with face_texcoords; those, face_textures and face_materials have N in front, and refer to lists of all meshes. Outputs
- * with gradients but the image are refused, and so is uv.
+ * with face_texcoords; those, face_textures and face_materials have N in front, and refer to lists of all meshes.
  *
  * Outputs, and their gradients:
  *

@@ -25,14 +25,6 @@ bool is_attribute(std::string_view output) {
 
 Attribute attribute_of(const NamedArray& output) { return parse_attribute(output.name, "outputs (batch)"); }
 
-/// Throws InvalidArgument for an output that is not of faces of every view by itself.
-void require_output(const Renderer& renderer, const NamedArray& output) {
-  if (!impl_of(renderer).geometry->has_own_faces()) return;
-  if (is_attribute(output.name) || output.name == "uv")
-    throw InvalidArgument("outputs (batch)", output.name + " with faces of every view by itself",
-                          "image, face_id, barycentrics or effective_faces");
-}
-
 /// One view that every valid smoothing goes with, and all lights.
 View neutral_view() {
   constexpr float k_longest = 1e36F;  // of the lengths that require_scales() lets pass, for any gamma
@@ -159,11 +151,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
   if (!own_shapes) renderer.set_positions(0, vertices);
   const NamedArray* const given = find_colors(arrays);
   const auto colors = given ? given->rows<const glm::vec3>() : std::span<const glm::vec3>();
-  const bool has_own_faces = impl_of(renderer).geometry->has_own_faces();
-  // Colours of faces of every view by itself are one list.
-  const bool own_colors = has_own_faces
-                              ? given != find(arrays, "face_colors")
-                              : given && views.size() > 1 && given->shape.size() == 3 && given->shape[0] > 1;
+  const bool own_colors = given && views.size() > 1 && given->shape.size() == 3 && given->shape[0] > 1;
   if (!own_colors) {
     renderer.set_colors(0, given ? colors : std::vector<glm::vec3>(count, glm::vec3(1.0F)));
   }
@@ -192,10 +180,7 @@ void Batch::require_image(const NamedArray& array, std::size_t channels) {
 
 void Batch::read(NamedArrays outputs) {
   Renderer& renderer = frame_.renderer();
-  for (const NamedArray& output : outputs) {
-    require_image(output, channels_of(output.name));
-    require_output(renderer, output);
-  }
+  for (const NamedArray& output : outputs) require_image(output, channels_of(output.name));
   std::vector<AuxiliaryOutputs> auxiliary;
   for (const NamedArray& output : outputs) {
     if (output.name == "image") {

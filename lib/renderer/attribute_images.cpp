@@ -13,36 +13,39 @@
 namespace dpr {
 namespace {
 
-/// Those of the faces' corners, face after face.
-std::vector<glm::vec3> positions_of_corners(const Mesh& mesh) {
+/// Those of the corners of a view's faces, face after face.
+std::vector<glm::vec3> positions_of_corners(const Mesh& mesh, std::size_t views_of_faces = 1) {
   std::vector<glm::vec3> positions;
-  for (const glm::uvec3& face : mesh.faces) {
+  for (const glm::uvec3& face : std::span(mesh.faces).first(mesh.faces.size() / views_of_faces)) {
     for (int corner = 0; corner < 3; ++corner) positions.push_back(mesh.positions[face[corner]]);
   }
   return positions;
 }
 
-/// The mesh with a colour for every number of the domain. Corners become vertices, face after face.
-Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain) {
+/// The mesh with a colour for every number of the domain, and the faces of its views `passes` times. Corners become
+/// vertices, face after face.
+Mesh shown_mesh(const Mesh& mesh, AttributeDomain domain, std::size_t views_of_faces, std::size_t passes) {
   Mesh shown;
-  if (domain != AttributeDomain::corners) {
+  std::vector<glm::uvec3> faces = mesh.faces;
+  if (domain == AttributeDomain::corners) {
+    shown.positions = positions_of_corners(mesh, views_of_faces);
+    const auto corners = to_uint(shown.positions.size());
+    for (cl_uint i = 0; i < faces.size(); ++i) faces[i] = glm::uvec3(3 * i) % corners + glm::uvec3(0, 1, 2);
+  } else {
     shown.positions = mesh.positions;
-    shown.faces = mesh.faces;
-    const bool of_faces = domain == AttributeDomain::faces;
-    (of_faces ? shown.face_colors : shown.vertex_colors)
-        .resize(of_faces ? mesh.faces.size() : mesh.positions.size());
-    return shown;
   }
-  shown.positions = positions_of_corners(mesh);
-  for (unsigned first = 0; first < shown.positions.size(); first += 3)
-    shown.faces.emplace_back(first, first + 1, first + 2);
-  shown.vertex_colors.resize(shown.positions.size());
+  for (std::size_t pass = 0; pass < passes; ++pass)
+    shown.faces.insert(shown.faces.end(), faces.begin(), faces.end());
+  const bool of_faces = domain == AttributeDomain::faces;
+  (of_faces ? shown.face_colors : shown.vertex_colors)
+      .resize(of_faces ? shown.faces.size() : shown.positions.size());
   return shown;
 }
 
 /// The scene's faces in the dark, with a colour for every number of the domain. What instances show differs:
 /// each is a mesh.
-Scene shown_scene(const Scene& source, AttributeDomain domain) {
+Scene shown_scene(const Scene& source, AttributeDomain domain, std::size_t views_of_faces,
+                  std::size_t passes) {
   Scene scene;
   scene.width = source.width;
   scene.height = source.height;
@@ -51,24 +54,29 @@ Scene shown_scene(const Scene& source, AttributeDomain domain) {
   scene.perspective_correct = source.perspective_correct;
   scene.cull = source.cull;
   for (std::size_t m = 0; m < source.meshes.size(); ++m)
-    scene.meshes.push_back({shown_mesh(mesh_of(source, m), domain), source.meshes[m].transform});
+    scene.meshes.push_back(
+        {shown_mesh(mesh_of(source, m), domain, views_of_faces, passes), source.meshes[m].transform});
   return scene;
 }
 
-/// Vertices of the scene that are shown, in order; `first` is the number of a mesh's first.
+/// Vertices of the scene that are shown, in order, of views with faces of their own view after view; `first` is the
+/// number of a mesh's first, of `count` in a view.
 std::vector<cl_uint> vertices_shown(const Scene& scene, AttributeDomain domain, const Geometry& geometry,
-                                    std::size_t MeshRange::*first) {
+                                    std::size_t MeshRange::*first, std::size_t count) {
   std::vector<cl_uint> vertices;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
-    const cl_uint first_vertex = to_uint(geometry.meshes[m].*first);
-    if (domain == AttributeDomain::corners) {
-      for (const glm::uvec3& face : mesh.faces)
-        vertices.insert(vertices.end(),
-                        {first_vertex + face.x, first_vertex + face.y, first_vertex + face.z});
-    } else {
-      for (cl_uint vertex = 0; vertex < mesh.positions.size(); ++vertex)
-        vertices.push_back(first_vertex + vertex);
+    const std::size_t faces = mesh.faces.size() / geometry.views_of_faces;
+    for (std::size_t view = 0; view < geometry.views_of_faces; ++view) {
+      const cl_uint first_vertex = to_uint(view * count + geometry.meshes[m].*first);
+      if (domain == AttributeDomain::corners) {
+        for (const glm::uvec3& face : std::span(mesh.faces).subspan(view * faces, faces))
+          vertices.insert(vertices.end(),
+                          {first_vertex + face.x, first_vertex + face.y, first_vertex + face.z});
+      } else {
+        for (cl_uint vertex = 0; vertex < mesh.positions.size(); ++vertex)
+          vertices.push_back(first_vertex + vertex);
+      }
     }
   }
   return vertices;
@@ -107,7 +115,7 @@ void AttributeImages::Impl::require_forward(const char* caller) const {
 }
 
 void AttributeImages::Impl::require_values(Renderer::Impl& source) const {
-  const std::size_t expected = channels * source.geometry->vertices;
+  const std::size_t expected = channels * source.geometry->views_of_faces * source.geometry->vertices;
   if (!attribute && value_count_ != expected) {
     throw InvalidArgument("values (attribute images)", std::to_string(value_count_),
                           std::to_string(expected) + ", vertices of the scene x channels");
@@ -118,9 +126,15 @@ void AttributeImages::Impl::require_values(Renderer::Impl& source) const {
   }
 }
 
-bool AttributeImages::Impl::shows_faces_of(const Scene& scene) const {
-  const Scene& own = renderer.scene();
-  if (own.width != scene.width || own.height != scene.height ||
+std::size_t AttributeImages::Impl::views_of_faces(const Renderer::Impl& source) const {
+  const Geometry& geometry = *source.geometry;
+  return geometry.has_own_faces() ? passes(source.scene.smoothing) * geometry.views_of_faces : 1;
+}
+
+bool AttributeImages::Impl::shows_faces_of(const Renderer::Impl& source) const {
+  const Scene &scene = source.scene, &own = renderer.scene();
+  if (meshes_.empty() || impl_of(renderer).geometry->views_of_faces != views_of_faces(source) ||
+      own.width != scene.width || own.height != scene.height ||
       own.perspective_correct != scene.perspective_correct || meshes_.size() != scene.meshes.size())
     return false;
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
@@ -138,12 +152,17 @@ void AttributeImages::Impl::show_faces_of(const Renderer::Impl& source) {
   Device::Impl& device = impl_of(renderer.device());
   meshes_.clear();
   fold_.reset();
-  renderer.set_scene(shown_scene(scene, domain()));
+  views_of_rows_ = geometry.views_of_faces;
+  const std::size_t of_all = views_of_faces(source);
+  impl_of(renderer).set_scene(shown_scene(scene, domain(), geometry.views_of_faces, of_all / views_of_rows_),
+                              of_all);
   if (room) impl_of(renderer).reserve(*room);
-  positions_ = RowMap(device, vertices_shown(scene, domain(), geometry, &MeshRange::first_position),
-                      geometry.position_count);
-  vertices_ =
-      RowMap(device, vertices_shown(scene, domain(), geometry, &MeshRange::first_vertex), geometry.vertices);
+  const auto map = [&](std::size_t MeshRange::*first, std::size_t count) {
+    return RowMap(device, vertices_shown(scene, domain(), geometry, first, count),
+                  geometry.views_of_faces * count);
+  };
+  positions_ = map(&MeshRange::first_position, geometry.position_count);
+  vertices_ = map(&MeshRange::first_vertex, geometry.vertices);
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
     meshes_.push_back({scene.meshes[m].instance_of, mesh.positions.size(), mesh.faces});
@@ -153,7 +172,7 @@ void AttributeImages::Impl::show_faces_of(const Renderer::Impl& source) {
 /// Brings the renderer's scene and views up to the source's.
 void AttributeImages::Impl::follow(Renderer::Impl& source) {
   const Scene& scene = source.scene;
-  if (!shows_faces_of(scene)) show_faces_of(source);
+  if (!shows_faces_of(source)) show_faces_of(source);
   if (renderer.scene().cull != scene.cull) renderer.set_cull(scene.cull);
   follow_views(source);
   has_own_shapes_ = source.frame.position_stride != 0;
@@ -212,8 +231,8 @@ void AttributeImages::Impl::follow_positions(const Renderer::Impl& source) {
 
 void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
   Renderer::Impl& r = impl_of(renderer);
-  rows_.move(positions_, source.views.size(), source.geometry->view_positions, r.views.size(),
-             r.geometry->view_positions);
+  rows_.move(positions_, of_rows(source.views.size()), source.geometry->view_positions,
+             of_rows(r.views.size()), r.geometry->view_positions);
   r.frame.position_stride = r.frame.vertices;
   r.has_moved = true;
   std::vector<BoxCorners> boxes;
@@ -221,6 +240,7 @@ void AttributeImages::Impl::follow_shapes(const Renderer::Impl& source) {
     std::ranges::copy(source.clip_planes.boxes_of_views(), std::back_inserter(boxes));
   r.clip_planes.set_boxes_of_views(std::move(boxes));
   if (!source.clip_planes.knows_views()) r.clip_planes.forget_views();
+  r.take_windings(source, passes());
 }
 
 void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
@@ -233,7 +253,8 @@ void AttributeImages::Impl::forward(Renderer::Impl& source, FrameSizes sizes) {
   Renderer::Impl& r = impl_of(renderer);
   r.frame.color_stride = to_uint(r.geometry->colors);
   if (has_rows()) {
-    rows_.forward(row_map(), channels, row_values(), passes(), source.views.size(), r.geometry->view_colors);
+    rows_.forward(row_map(), channels, row_values(), passes(), of_rows(source.views.size()),
+                  r.geometry->view_colors);
   } else {
     r.geometry_colors->shown_views = source.views.size();
   }
@@ -266,11 +287,12 @@ BufferRef<cl_float4> AttributeImages::Impl::grad_of_rendered(const BufferRef<cl_
 void AttributeImages::Impl::gather() {
   Renderer::Impl& r = impl_of(renderer);
   if (wanted_.positions) {
-    const std::size_t sources = has_own_shapes_ ? views : 1, copies = has_own_shapes_ ? r.views.size() : 1;
+    const std::size_t sources = has_own_shapes_ ? of_rows(views) : 1,
+                      copies = has_own_shapes_ ? of_rows(r.views.size()) : 1;
     rows_.move_backward(positions_, sources, r.transform.grad_positions, copies, grad_positions_);
   }
   if (has_rows() && r.wants(ArrayId::colors))
-    rows_.backward(row_map(), channels, views, r.grad_colors, grad_rows_);
+    rows_.backward(row_map(), channels, of_rows(views), r.grad_colors, grad_rows_);
 }
 
 SceneGradient AttributeImages::Impl::backward(const BufferRef<cl_float4>& grad_images) {
@@ -354,37 +376,6 @@ void AttributeImages::Impl::take_values(const FloatVectors& from, std::size_t co
   values_.resize(impl_of(renderer.device()), count * channels);
   impl_of(renderer).made_exchange().take(from, count, values_, channels);
   value_count_ = count * channels;
-}
-
-BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
-  Renderer::Impl& r = impl_of(renderer);
-  if (r.device_gradient_frame != r.frame_number)
-    throw InvalidArgument("gradient_view", "no gradient of the last images", "backward_on_device() first");
-  const auto rows = [&](std::size_t first, std::size_t count) {
-    return BufferView{grad_rows_.cl_buffer()(), first * channels * sizeof(float), channels * sizeof(float),
-                      count, channels};
-  };
-  const auto positions = [&](std::size_t first, std::size_t count) {
-    return BufferView{grad_positions_.cl_buffer()(), first * sizeof(cl_float4), sizeof(cl_float4), count, 3};
-  };
-  if (!attribute && name == "values") return rows(0, vertices_.rows);
-  if (wanted_.positions && has_own_shapes_ && name == "shapes.positions")
-    return positions(0, views * positions_.rows);
-  std::size_t first_position = 0;
-  for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (meshes_[m].instance_of) continue;
-    const std::string mesh = checks::element("meshes", m);
-    if (wanted_.positions && !has_own_shapes_ && name == mesh + ".positions")
-      return positions(first_position, meshes_[m].vertices);
-    if (attribute == Attribute::texcoords && wanted_.texcoords && name == mesh + ".texcoords")
-      return rows(texcoords_->first[m], texcoords_->first[m + 1] - texcoords_->first[m]);
-    first_position += meshes_[m].vertices;
-  }
-  SceneGradient arrays = empty_gradient();
-  if (const auto numbers = summed_view(arrays, r, grad_numbers_, name)) return *numbers;
-  throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",
-                        "a gradient that attribute images have and the scene asks for, such as "
-                        "\"meshes[0].positions\", \"views[0].camera.rotation\", \"sigma\" or \"values\"");
 }
 
 }  // namespace dpr

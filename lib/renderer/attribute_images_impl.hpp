@@ -58,13 +58,17 @@ struct AttributeImages::Impl {
  private:
   AttributeDomain domain() const;
   bool has_rows() const { return !attribute || attribute == Attribute::texcoords; }
-  bool shows_faces_of(const Scene& scene) const;
+  /// Of the renderer, for a source.
+  std::size_t views_of_faces(const Renderer::Impl& source) const;
+  bool shows_faces_of(const Renderer::Impl& source) const;
   void require_values(Renderer::Impl& source) const;
   void show_faces_of(const Renderer::Impl& source);
   void follow(Renderer::Impl& source);
   void follow_views(const Renderer::Impl& source);
   void follow_positions(const Renderer::Impl& source);
   void follow_shapes(const Renderer::Impl& source);
+  /// Lists of rows that so many views have: one for all that have faces of their own.
+  std::size_t of_rows(std::size_t its_views) const { return its_views / views_of_rows_; }
   const RowMap& row_map() const { return attribute ? texcoords_->map : vertices_; }
   const Buffer<float>& row_values() const { return attribute ? texcoords_->values : values_; }
 
@@ -80,6 +84,7 @@ struct AttributeImages::Impl {
   std::vector<SourceMesh> meshes_;  // of the source
   RowMap positions_, vertices_;  // of the source, at those that are shown; places of a mesh share positions
   bool has_own_shapes_ = false;
+  std::size_t views_of_rows_ = 1;               // that share a list of rows
   std::shared_ptr<CornerTexcoords> texcoords_;  // the source's, where they are shown
   Buffer<float> values_;                        // the caller's
   std::size_t value_count_ = 0;

@@ -62,6 +62,37 @@ void copy_images(AttributeImages& images, const BufferSpan& to, const Events& ev
   copy_view(impl_of(impl_of(images).renderer), image_view(images), to, events, "images");
 }
 
+BufferView AttributeImages::Impl::gradient_view(const std::string& name) {
+  Renderer::Impl& r = impl_of(renderer);
+  if (r.device_gradient_frame != r.frame_number)
+    throw InvalidArgument("gradient_view", "no gradient of the last images", "backward_on_device() first");
+  const auto rows = [&](std::size_t first, std::size_t count) {
+    return BufferView{grad_rows_.cl_buffer()(), first * channels * sizeof(float), channels * sizeof(float),
+                      count, channels};
+  };
+  const auto positions = [&](std::size_t first, std::size_t count) {
+    return BufferView{grad_positions_.cl_buffer()(), first * sizeof(cl_float4), sizeof(cl_float4), count, 3};
+  };
+  if (!attribute && name == "values") return rows(0, vertices_.rows);
+  if (wanted_.positions && has_own_shapes_ && name == "shapes.positions")
+    return positions(0, views * positions_.rows);
+  std::size_t first_position = 0;
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (meshes_[m].instance_of) continue;
+    const std::string mesh = checks::element("meshes", m);
+    if (wanted_.positions && !has_own_shapes_ && name == mesh + ".positions")
+      return positions(first_position, meshes_[m].vertices);
+    if (attribute == Attribute::texcoords && wanted_.texcoords && name == mesh + ".texcoords")
+      return rows(texcoords_->first[m], texcoords_->first[m + 1] - texcoords_->first[m]);
+    first_position += meshes_[m].vertices;
+  }
+  SceneGradient arrays = empty_gradient();
+  if (const auto numbers = summed_view(arrays, r, grad_numbers_, name)) return *numbers;
+  throw InvalidArgument("name (gradient_view)", "\"" + name + "\"",
+                        "a gradient that attribute images have and the scene asks for, such as "
+                        "\"meshes[0].positions\", \"views[0].camera.rotation\", \"sigma\" or \"values\"");
+}
+
 BufferView gradient_view(AttributeImages& images, const std::string& name) {
   impl_of(images).require_forward("gradient_view");
   return impl_of(images).gradient_view(name);

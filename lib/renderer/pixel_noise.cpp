@@ -200,6 +200,13 @@ void Renderer::Impl::find_edges() {
   has_moved = false;
 }
 
+void Renderer::Impl::take_windings(const Impl& of, std::size_t copies) {
+  shape_positions_.clear();
+  shape_windings_.clear();
+  for (std::size_t copy = 0; copy < copies; ++copy)
+    shape_windings_.insert(shape_windings_.end(), of.shape_windings_.begin(), of.shape_windings_.end());
+}
+
 /// Of shapes that the device alone knows none are known to be hidden.
 void Renderer::Impl::hide_back_faces() {
   const std::size_t count = views.size() * scene.meshes.size();

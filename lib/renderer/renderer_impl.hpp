@@ -87,7 +87,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// The setters' arguments are checked already.
   /// `views_of_faces`: above 1, the faces of the scene, of one mesh then, are those of so many views, as many of each,
   /// one view after the other, and so are opacities of vertices. All frames have these views, with shapes of their own,
-  /// and colours where faces have none. Such a mesh gives no normals.
+  /// and colours of faces of their own. Such a mesh gives no normals.
   void set_scene(const Scene& scene, std::size_t views_of_faces = 1);
   void set_views(std::span<const View> views, std::size_t first_view);
   /// All that depends on each other in one step: none need suit what was there of the others.
@@ -155,6 +155,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
   std::size_t take_emptied() { return std::exchange(found_emptied_, 0); }
   /// Fills `aov` for the last frame, if it does not hold that already, emptied or not.
   void render_aov();
+  /// Shapes of the views are those of another's views, `copies` times: how their faces wind is what that knows of it.
+  void take_windings(const Impl& of, std::size_t copies);
   /// The device alone knows where the mesh's vertices are.
   void forget_positions(std::size_t mesh) noexcept;
   /// Texture coordinates of all meshes' corners; none where a mesh has none.

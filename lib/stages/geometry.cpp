@@ -198,26 +198,26 @@ void Geometry::add_colors(Device::Impl& device, const Scene& scene, std::vector<
   const bool by_vertex = std::ranges::all_of(scene.meshes, [](const Instance& i) {
     return !i.mesh.vertex_colors.empty() && material_count(i.mesh) == 1;
   });
+  const bool numbers_by_view = has_own_faces() && scene.meshes[0].mesh.vertex_colors.empty();
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     const Mesh& mesh = mesh_of(scene, m);
     const MeshRange& source = meshes[scene.meshes[m].instance_of.value_or(m)];
     if (!scene.meshes[m].instance_of) {
       meshes[m].first_color = all_colors.size();
       for (const glm::vec3& color : mesh_colors(mesh)) all_colors.push_back(to_cl(color));
+      if (numbers_by_view) all_colors.resize(faces);
       meshes[m].colors = all_colors.size() - meshes[m].first_color;
     }
     for (std::size_t face = 0; face < mesh.faces.size() && !by_vertex; ++face)
-      all_faces.push_back(corner_elements(mesh, face, source.first_color, !mesh.vertex_colors.empty(),
-                                          !mesh.face_colors.empty(),
+      all_faces.push_back(corner_elements(mesh, numbers_by_view ? face % faces : face, source.first_color,
+                                          !mesh.vertex_colors.empty(), !mesh.face_colors.empty(),
                                           to_uint(source.first_material + material_of(mesh, face))));
   }
   colors = all_colors.size();
   color_values.upload(device, all_colors);
   if (by_vertex) return;
   color_faces = all_faces.size() - rows();
-  const bool are_by_view = has_own_faces() && !scene.meshes[0].mesh.vertex_colors.empty();
-  color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors,
-                                  are_by_view ? views_of_faces : 1);
+  color_corners_ = make_incidence(device, std::span(all_faces).subspan(color_faces), colors, views_of_faces);
 }
 
 /// Faces without a texture refer to the first coordinate, which adds nothing to its gradient.

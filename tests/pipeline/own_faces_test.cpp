@@ -99,7 +99,7 @@ void add_lights(Arrays& arrays, std::size_t first, std::size_t count) {
 }
 
 struct Found {
-  std::vector<float> image, vertices, colors, lights, opacities;
+  std::vector<float> image, normals, vertices, colors, lights, opacities;
 };
 
 Found rendered(const Arrays& arrays, const RenderSettings& settings, std::size_t views,
@@ -112,8 +112,13 @@ Found rendered(const Arrays& arrays, const RenderSettings& settings, std::size_t
   Batch batch(RendererPools::of_process().get(""), arrays.named, {settings, is_lit, 0, wanted});
   Found found;
   found.image.resize(views * side * side * 4);
-  batch.read(
-      std::vector<NamedArray>{{"image", found.image.data(), Element::float32, {views, side, side, 4}}});
+  const std::vector<std::size_t> pixels{views, side, side, 4};
+  std::vector<NamedArray> outputs{{"image", found.image.data(), Element::float32, pixels}};
+  if (!fades) {
+    found.normals.resize(found.image.size());
+    outputs.push_back({"normal", found.normals.data(), Element::float32, pixels});
+  }
+  batch.read(outputs);
   std::vector<float> grad(found.image.size());
   for (std::size_t i = 0; i < grad.size(); ++i)
     grad[i] = 0.5F + std::sin(static_cast<float>(i % (side * side * 4)));  // the same of every view
@@ -130,8 +135,8 @@ Found rendered(const Arrays& arrays, const RenderSettings& settings, std::size_t
     found.opacities.resize(views * vertices);
     gradients.push_back({"opacities", found.opacities.data(), Element::float32, {views * vertices}});
   }
-  batch.backward(std::vector<NamedArray>{{"image", grad.data(), Element::float32, {views, side, side, 4}}},
-                 gradients);
+  for (NamedArray& output : outputs) output.data = grad.data();
+  batch.backward(outputs, gradients);
   return found;
 }
 
@@ -196,6 +201,7 @@ void check(const std::vector<std::string>& texts, bool is_lit, bool fades = fals
     CHECK(difference(of_view(found.vertices), expected.vertices) < 1e-5);
     CHECK(difference(of_view(found.colors), expected.colors) < 1e-5);
     if (is_lit) CHECK(difference(of_view(found.lights), expected.lights) < 1e-5);
+    if (!fades) CHECK(difference(of_view(found.normals), expected.normals) < 1e-6);
     if (fades) CHECK(difference(of_view(found.opacities), expected.opacities) < 1e-5);
   }
 }

@@ -13,7 +13,8 @@ import dpr
 from dpr import _frames, _merged
 
 SIZE = 24
-NOISES = {"pixel": {"preset": "pixel", "blur": 0.7}, "triangles": {"sigma": 1e-3, "gamma": 0.05}}
+NOISES = {"pixel": {"preset": "pixel", "blur": 0.7}, "joint": {"preset": "joint_gaussian", "sigma": 1e-3, "gamma": 0.05},
+          "barrier": {"preset": "gaussian", "sigma": 1e-3, "gamma": 0.05}}
 RANDOM = np.random.default_rng(3)
 
 
@@ -121,7 +122,10 @@ def rendered(arguments, noise, is_merged, outputs=()):
         finally:
             mock.patch.stopall()
         image, others = found if outputs else (found, {})
-        return image, others, pullback(np.sin(np.arange(image.size, dtype=np.float32)).reshape(image.shape)), len(frames)
+        grads = {name: np.cos(np.arange(array.size, dtype=np.float32)).reshape(array.shape)
+                 for name, array in others.items() if name in _frames.WITH_GRADIENTS}
+        grad = np.sin(np.arange(image.size, dtype=np.float32)).reshape(image.shape)
+        return image, others, pullback(grad, **grads), len(frames)
 
 
 class ListsTest(unittest.TestCase):
@@ -197,7 +201,20 @@ class ListsTest(unittest.TestCase):
             np.testing.assert_array_equal(found["face_id"], expected["face_id"])
             for name in outputs[1:]:
                 self.assert_close(found[name], expected[name], 1e-5, name)
-        self.assertEqual(rendered({}, "pixel", True, ["depth"])[3], 4)
+
+    def test_outputs_with_gradients(self):
+        outputs = ["depth", "position", "normal", "texcoords", "uv"]
+        for noise in NOISES:
+            with self.subTest(noise):
+                (image, found, gradients, count), (_, expected, of_each_alone, _) = (
+                    rendered(VARIANTS["textures"], noise, merged, outputs) for merged in (True, False))
+                self.assertEqual(count, 1)
+                for name in outputs:
+                    self.assertGreater(np.abs(expected[name]).max(), 0.2)
+                    self.assert_close(found[name], expected[name], 1e-5, name)
+                for found, other in zip(flat(gradients), flat(of_each_alone)):
+                    self.assertEqual(found.shape, other.shape)
+                    self.assert_close(found, other, 3e-5, noise)
 
     def test_tangents(self):
         tangents = {"vertices": [random(2, *vertices.shape) for vertices in VERTICES], "views": random(2, 4, 4, 4)}

@@ -7,7 +7,6 @@ _OF_ALL = ("background", "sigma", "gamma", "alpha")
 """Arrays that are one for all views of a frame, as lights may be."""
 _KNOWN = {"vertices", "faces", "views", "intrinsics", "colors", "face_colors", "opacities", "face_opacities", "texcoords",
           "face_texcoords", "face_textures", "materials.specular", "materials.shininess", "face_materials", *_OF_ALL}
-_OUTPUTS = {"face_id", "barycentrics", "effective_faces"}
 _MOST_PADDING, _SMALL = 2, 4096
 """Times as many faces and vertices, with padding, as the meshes have, beyond so many."""
 _MOST_PIXELS = 1 << 24
@@ -69,7 +68,7 @@ def groups_of(spec, frames, arrays):
     """Lists of the numbers of frames, of (settings, parts), that are rendered as one."""
     alone = [[i] for i in range(len(frames))]
     # Noise that is drawn has the numbers of the views in the call.
-    if len(frames) == 1 or not set(spec.outputs) <= _OUTPUTS or any("monte_carlo" in text for text in spec.settings):
+    if len(frames) == 1 or any("monte_carlo" in text for text in spec.settings):
         return alone
     kinds = {}
     for i, (settings, parts) in enumerate(frames):

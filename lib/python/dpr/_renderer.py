@@ -138,8 +138,8 @@ class Renderer:
         Meshes of different topology are lists, one mesh a view: of [V_i, 3], of [F_i, 3], and likewise of their
         colours, textures (each a tensor or a list) and materials, with None for a mesh without; words and a dictionary
         may be those of all. Or they are padded, faces [N, F, 3] with -1 behind a mesh's last face and vertices [N, V,
-        3]. A mesh without faces shows the background. Those of alike sizes share their launches; but with outputs
-        that have gradients, and with Monte Carlo, they are rendered one after the other.
+        3]. A mesh without faces shows the background. Those of alike sizes share their launches; with Monte Carlo
+        they are rendered one after the other.
 
         Arrays are of NumPy, PyTorch, JAX, or any library with DLPack, and what is returned is of the same, float32;
         nested lists of numbers are NumPy's. float32, int64 and int32 are read where they are, if packed and on the CPU;
