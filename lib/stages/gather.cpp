@@ -17,38 +17,29 @@ shared::FrameParams by_rows(shared::FrameParams p) {
 
 void Gather::per_view(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
                       const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
-  const shared::FrameParams rows = by_rows(p);
-  const std::size_t of_rows = p.views / rows.views * targets;
-  grad.resize(device_, p.views * targets);
-  sum_chunks(p, bin, k_corner_channels, partial);
-  launch_(p.views * targets, kernel::gather_corners{.p = rows,
-                                                    .targets = to_uint(of_rows),
-                                                    .sum_views = 0U,
-                                                    .pair_starts = bin.pair_starts,
-                                                    .face_pairs = bin.face_pairs,
-                                                    .corner_starts = incidence.starts,
-                                                    .corners = incidence.corners,
-                                                    .partial = partial.values,
-                                                    .first = partial.first,
-                                                    .chunks = chunks_,
-                                                    .grad = grad});
+  corners(p, p.views / by_rows(p).views * targets, p.views * targets, bin, incidence, partial, grad);
 }
 
 void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const Bin& bin,
                         const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
-  grad.resize(device_, targets);
+  corners(p, targets, targets, bin, incidence, partial, grad);
+}
+
+void Gather::corners(const shared::FrameParams& p, std::size_t targets, std::size_t sums, const Bin& bin,
+                     const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
+  grad.resize(device_, sums);
   sum_chunks(p, bin, k_corner_channels, partial);
-  launch_(targets, kernel::gather_corners{.p = by_rows(p),
-                                          .targets = static_cast<cl_uint>(targets),
-                                          .sum_views = 1U,
-                                          .pair_starts = bin.pair_starts,
-                                          .face_pairs = bin.face_pairs,
-                                          .corner_starts = incidence.starts,
-                                          .corners = incidence.corners,
-                                          .partial = partial.values,
-                                          .first = partial.first,
-                                          .chunks = chunks_,
-                                          .grad = grad});
+  launch_(sums, kernel::gather_corners{.p = by_rows(p),
+                                       .targets = to_uint(targets),
+                                       .sum_views = cl_uint{sums == targets},
+                                       .pair_starts = bin.pair_starts,
+                                       .face_pairs = bin.face_pairs,
+                                       .corner_starts = incidence.starts,
+                                       .corners = incidence.corners,
+                                       .partial = partial.values,
+                                       .first = partial.first,
+                                       .chunks = chunks_,
+                                       .grad = grad});
 }
 
 void Gather::over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,

@@ -33,6 +33,9 @@ class Gather {
   std::size_t bytes() const { return chunks_.capacity_bytes(); }
 
  private:
+  /// Of as many targets as by_rows() has a view: `sums`, one for each, or for each in every view.
+  void corners(const shared::FrameParams& p, std::size_t targets, std::size_t sums, const Bin& bin,
+               const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad);
   /// Sums chunks of faces that may have more pairs than one work-item is to add.
   void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels, const PairSums& partial);
 
