@@ -11,6 +11,7 @@
 #include "dpr/aov.hpp"
 #include "dpr/attribute_images.hpp"
 #include "dpr/camera.hpp"
+#include "dpr/clip_space.hpp"
 #include "dpr/device.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"

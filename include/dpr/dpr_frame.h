@@ -181,6 +181,21 @@ DPR_API dpr_status dpr_cut_size(const dpr_cut* cut, size_t* faces, size_t* verti
 DPR_API dpr_status dpr_cut_read(const dpr_cut* cut, const dpr_array* arrays, size_t count);
 DPR_API void dpr_cut_destroy(dpr_cut* cut);
 
+/* Positions in OpenGL's clip space as vertices in front of a camera, for frames: dpr/clip_space.hpp. Of the arrays positions
+ * [V, 4] or [N, V, 4], and faces [F, 3], of whose vertices nothing else matters, or all without. */
+typedef struct dpr_clip_space dpr_clip_space;
+DPR_API dpr_status dpr_clip_space_create(int width, int height, const dpr_array* arrays, size_t count,
+                                         dpr_clip_space** clip_space);
+/* How many shapes there are, and numbers in a row of intrinsics: 4 of a pinhole, 1 of an orthographic camera. */
+DPR_API dpr_status dpr_clip_space_size(const dpr_clip_space* clip_space, size_t* shapes, size_t* intrinsics);
+/* Fills the float32 arrays that are named: vertices [N, V, 3], views [N, 4, 4] and intrinsics [N, ...], which frames take,
+ * planes [2], their settings znear and zfar, and scales [N]. */
+DPR_API dpr_status dpr_clip_space_read(const dpr_clip_space* clip_space, const dpr_array* arrays, size_t count);
+/* From the gradients of vertices, [N, V, 3], to those of positions, [N, V, 4]. */
+DPR_API dpr_status dpr_clip_space_backward(const dpr_clip_space* clip_space, const dpr_array* grad_vertices,
+                                           const dpr_array* grad_positions);
+DPR_API void dpr_clip_space_destroy(dpr_clip_space* clip_space);
+
 /* A mesh of a file: dpr/mesh.hpp has the formats and their errors. */
 typedef struct dpr_mesh_file dpr_mesh_file;
 

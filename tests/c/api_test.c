@@ -942,6 +942,73 @@ static void test_frame_samples(void) {
   dpr_frame_destroy(frame);
 }
 
+/* A triangle by its positions in clip space, under z = 1.2 w - 2.2: a frame's image and gradient, and those of a step. */
+static void test_clip_space(void) {
+  static float pixels[FLOATS], moved[FLOATS], weights[FLOATS];
+  float positions_of_clip[] = {-1.5f, -1.2f, 1.4f, 3, 1.4f, -1, 2.6f, 4, 0.2f, 1.3f, 0.8f, 2.5f};
+  float vertices[9], views[16], intrinsics[4], planes[2], by_vertices[9], by_positions[12];
+  int32_t of_faces[] = {0, 1, 2};
+  char znear[32], zfar[32];
+  const char* settings[] = {"preset=pixel", "sigma=1e-2", znear, zfar};
+  const char* const wanted[] = {"vertices"};
+  dpr_array given[] = {{"positions", positions_of_clip, DPR_FLOAT32, 3, {1, 3, 4}},
+                       {"faces", of_faces, DPR_INT32, 2, {1, 3}}};
+  const dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 3, {1, 3, 3}},
+                              {"views", views, DPR_FLOAT32, 3, {1, 4, 4}},
+                              {"intrinsics", intrinsics, DPR_FLOAT32, 2, {1, 4}},
+                              {"planes", planes, DPR_FLOAT32, 1, {2}}};
+  const dpr_array grad = {"image", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array gradient = {"vertices", by_vertices, DPR_FLOAT32, 3, {1, 3, 3}};
+  dpr_array of_positions = {"positions", by_positions, DPR_FLOAT32, 3, {1, 3, 4}};
+  const float step = 2e-3f;
+  double by_step = 0;
+  size_t shapes = 0, numbers = 0;
+  int side, i;
+  for (i = 0; i < FLOATS; ++i) weights[i] = sinf(0.7f * (float)i);
+  for (side = 0; side < 3; ++side) { /* as it is, and a step to either side */
+    dpr_array frame_arrays[4];
+    dpr_frame_options options = DPR_FRAME_OPTIONS_INIT;
+    dpr_clip_space* clip = NULL;
+    dpr_frame* frame = NULL;
+    const dpr_array image = {"image", side == 0 ? pixels : moved, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+    positions_of_clip[4] += side == 0 ? 0 : side == 1 ? step : -2 * step; /* x of a corner */
+    OK(dpr_clip_space_create(SIDE, SIDE, given, 2, &clip));
+    OK(dpr_clip_space_size(clip, &shapes, &numbers));
+    EXPECT(shapes == 1 && numbers == 4);
+    OK(dpr_clip_space_read(clip, arrays, 4));
+    memcpy(frame_arrays, arrays, sizeof frame_arrays);
+    frame_arrays[3] = given[1];
+    sprintf(znear, "znear=%g", planes[0]), sprintf(zfar, "zfar=%g", planes[1]);
+    options.width = options.height = SIDE;
+    options.settings = settings, options.setting_count = 4;
+    options.gradients = wanted, options.gradient_count = 1;
+    OK(dpr_frame_render(&options, frame_arrays, 4, &frame));
+    OK(dpr_frame_read(frame, &image, 1));
+    if (side == 0) {
+      OK(dpr_frame_backward(frame, &grad, 1, &gradient, 1));
+      OK(dpr_clip_space_backward(clip, &gradient, &of_positions));
+      of_positions.shape[1] = 2;
+      REFUSED(dpr_clip_space_backward(clip, &gradient, &of_positions), "positions");
+      REFUSED(dpr_clip_space_read(clip, given, 1), "vertices, views, intrinsics, planes or scales");
+    } else {
+      for (i = 0; i < FLOATS; ++i)
+        by_step += (side == 1 ? 1.0 : -1.0) * (double)weights[i] * (double)moved[i];
+    }
+    dpr_frame_destroy(frame);
+    dpr_clip_space_destroy(clip);
+  }
+  by_step /= 2 * (double)step;
+  EXPECT(fabs(by_step) > 0.1 && fabs(by_step - (double)by_positions[4]) < 0.02 * fabs(by_step));
+  {
+    dpr_clip_space* clip = NULL;
+    given[0].shape[2] = 3;
+    REFUSED(dpr_clip_space_create(SIDE, SIDE, given, 2, &clip), "positions");
+    given[0].shape[2] = 4, of_faces[0] = 7;
+    REFUSED(dpr_clip_space_create(SIDE, SIDE, given, 2, &clip), "faces");
+    EXPECT(clip == NULL);
+  }
+}
+
 /* The two nearest surfaces of two triangles, one behind the other; and forward against backward mode of samples and of
  * what is made of them: <u, J v> = <J^T u, v>, two directions at once. */
 static void test_frame_layers(void) {
@@ -1703,6 +1770,7 @@ int main(void) {
   test_image_files();
   test_frame_samples();
   test_frame_layers();
+  test_clip_space();
   test_setters(device);
   test_mesh_loss(device, scene);
   test_attributes(device, scene);

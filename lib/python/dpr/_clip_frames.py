@@ -33,7 +33,8 @@ class _Frame:
         used = torch.full((pos.shape[1],), self.faces.ndim == 3)
         if self.faces.ndim == 2:
             used[self.faces.long().reshape(-1)] = True
-        camera = _clip_space.camera_of(pos, used, "dpr.nvdiffrast." + self._call)
+        faces = self.faces if self.faces.ndim == 2 else None
+        camera = _clip_space.camera_of(pos, faces, (self._height, self._width), "dpr.nvdiffrast." + self._call)
         return camera, camera.vertices(pos, used, self._width, self._height)
 
     def _inner(self, samples):
@@ -152,8 +153,7 @@ class Frames:
         meshes = {image: _mesh_of(tri[first:first + count]) for image, (first, count) in enumerate(ranges) if count}
         sizes = {True: [], False: []}
         for image, (index, faces) in meshes.items():
-            corners = pos.detach()[None, index]
-            camera = _clip_space.camera_of(corners, torch.ones(len(index), dtype=torch.bool), "dpr.nvdiffrast." + call)
+            camera = _clip_space.camera_of(pos[None, index], None, size, "dpr.nvdiffrast." + call)
             sizes[camera.is_perspective].append((len(faces), len(index), image))
         pad = torch.nn.utils.rnn.pad_sequence
         for alike in filter(None, sizes.values()):

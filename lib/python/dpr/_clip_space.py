@@ -1,11 +1,11 @@
 """Clip-space positions (x, y, z, w) of OpenGL as vertices in front of the library's cameras."""
+import ctypes
 import dataclasses
 
+import numpy as np
 import torch
 
-from . import _arrays
-
-_FLAT, _ROUNDING, _LEAST_NEAR = 1e-4, 1e-4, 1e-6
+from . import _frames, _library
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,38 +35,24 @@ class Camera:
         return views, torch.tensor([lens]).repeat(count, 1)
 
 
-def _fit(z, w):
-    """(a, b, is_affine) of each row's least-squares fit z = a w + b; is_affine: the fit is exact but for rounding."""
-    mean_w, mean_z = w.mean(1, keepdim=True), z.mean(1, keepdim=True)
-    spread = (w - mean_w).square().sum(1, keepdim=True).clamp(min=1e-300)
-    a = ((w - mean_w) * (z - mean_z)).sum(1, keepdim=True) / spread
-    b = mean_z - a * mean_w
-    largest = z.abs().amax(1, keepdim=True) + w.abs().amax(1, keepdim=True)
-    return a, b, ((z - a * w - b).abs() <= _ROUNDING * largest).all(1, keepdim=True)
-
-
-def camera_of(pos, used, where):
-    """Camera of positions [N, V, 4]. used [V]: vertices that triangles use.
-
-    A projection matrix makes z = a w + b. Then w serves as depth: it is more precise than z / w, and triangles may
-    reach behind the camera. The near plane z = -w is the plane w = -b / (a + 1), and z / w grows with w unless b is
-    positive. Otherwise z / w serves as depth, which needs all positions in front of the camera."""
-    z, w = pos.detach()[:, used, 2:].double().unbind(-1)
-    if not z.shape[1]:
-        return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
-    least, most = w.amin(1, keepdim=True), w.amax(1, keepdim=True)
-    a, b, is_affine = _fit(z, w)
-    near = torch.where(a > -1, -b / (a + 1).clamp(min=1e-30), torch.zeros_like(b))
-    near = torch.maximum(near, _LEAST_NEAR * most.abs())
-    is_clipped = least < near
-    scale = 1 / torch.where(is_clipped, near, least).clamp(min=1e-30)
-    # Drop of z / w from the nearest to the furthest vertex. Positive: z / w orders depths the other way round.
-    fall = b * (scale - 1 / most)
-    is_flat = most - least <= _FLAT * most.abs()
-    if bool(((is_affine & (fall <= _ROUNDING) & ~is_flat) | (most <= 0)).all()):
-        znear, furthest = 1.0 if bool(is_clipped.any()) else 0.999, float((scale * most).max())
-        return Camera(True, scale[..., None].to(pos.dtype), znear, max(1.01 * furthest, 2.0))
-    if bool((least > _LEAST_NEAR * most.abs()).all()):
-        return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
-    _arrays.fail(ValueError, "pos", "positions behind the camera (w <= 0) whose z is no affine function of w that "
-                 "orders depths", "positions of one projection matrix a shape, or all in front of the camera", where)
+def camera_of(pos, faces, size, where):
+    """Camera of positions [N, V, 4] as ClipSpace of the library finds it. faces [F, 3]: triangles of each shape; None: all
+    vertices count. size: (height, width)"""
+    given = [("positions", pos.detach().contiguous().numpy())]
+    if faces is not None:
+        if not len(faces):
+            return Camera(False, pos.new_ones(1, 1, 1), 1.0, 3.5)
+        given.append(("faces", faces.detach().contiguous().numpy()))
+    handle, shapes, intrinsics = ctypes.c_void_p(), ctypes.c_size_t(), ctypes.c_size_t()
+    try:
+        _library.call("dpr_clip_space_create", size[1], size[0], *_frames.c_arrays(given), ctypes.byref(handle))
+    except _library.InvalidArgument as error:
+        raise _library.InvalidArgument(str(error).replace("positions", "pos", 1).replace("ClipSpace", where)) from None
+    scales, planes = np.empty(len(pos), np.float32), np.empty(2, np.float32)
+    try:
+        _library.call("dpr_clip_space_size", handle, ctypes.byref(shapes), ctypes.byref(intrinsics))
+        _library.call("dpr_clip_space_read", handle, *_frames.c_arrays([("scales", scales), ("planes", planes)]))
+    finally:
+        _library.library.dpr_clip_space_destroy(handle)
+    scale = torch.from_numpy(scales)[:, None, None].to(pos.dtype)
+    return Camera(intrinsics.value == 4, scale, *map(float, planes))

@@ -98,6 +98,9 @@ _SIGNATURES = {
     "dpr_cut_create": [ctypes.POINTER(Options), *_ARRAYS, ctypes.c_float, ctypes.POINTER(_HANDLE)],
     "dpr_cut_size": [_HANDLE, ctypes.POINTER(_SIZE), ctypes.POINTER(_SIZE)],
     "dpr_cut_read": [_HANDLE, *_ARRAYS],
+    "dpr_clip_space_create": [ctypes.c_int, ctypes.c_int, *_ARRAYS, ctypes.POINTER(_HANDLE)],
+    "dpr_clip_space_size": [_HANDLE, ctypes.POINTER(_SIZE), ctypes.POINTER(_SIZE)],
+    "dpr_clip_space_read": [_HANDLE, *_ARRAYS],
     "dpr_image_file_read": [ctypes.c_char_p, ctypes.c_char_p, ctypes.POINTER(_HANDLE)],
     "dpr_image_file_pixels": [_HANDLE, ctypes.POINTER(Array)],
     "dpr_image_file_write": [ctypes.c_char_p, ctypes.c_char_p, ctypes.POINTER(Array)],
@@ -139,7 +142,7 @@ def _load():
     library.dpr_frame_settings.restype = ctypes.c_char_p
     for name, arguments in _SIGNATURES.items():
         getattr(library, name).argtypes = arguments
-    for name in ("dpr_frame_destroy", "dpr_cut_destroy", "dpr_image_file_destroy",
+    for name in ("dpr_frame_destroy", "dpr_cut_destroy", "dpr_clip_space_destroy", "dpr_image_file_destroy",
                  "dpr_mesh_file_destroy"):
         getattr(library, name).argtypes, getattr(library, name).restype = [_HANDLE], None
     return library
