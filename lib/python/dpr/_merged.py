@@ -50,9 +50,9 @@ def is_regular(mesh):
                     for name, bound in bounds.items() if name in mesh))
 
 
-def _kind(settings, parts, arrays):
-    """What frames must have in common to be one; None of one that stays alone, and of one that is to be refused by itself."""
-    mesh = {part.name: part.of(arrays[part.leaf]) for part in parts}
+def _kind(settings, parts, mesh):
+    """What frames must have in common to be one; None of one that stays alone, and of one that is to be refused by itself.
+    mesh: the parts' arrays, by name"""
     textures = {name for name in mesh if name.startswith("textures[")}
     lights = {name for name in mesh if name.startswith("lights.")}
     if "faces" not in mesh or not mesh.keys() - textures - lights <= _KNOWN or not is_regular(mesh):
@@ -72,9 +72,9 @@ def groups_of(spec, frames, arrays):
         return alone
     kinds = {}
     for i, (settings, parts) in enumerate(frames):
-        kind = _kind(settings, parts, arrays)
-        sizes = {part.name: part.of(arrays[part.leaf]).size // 3 for part in parts if part.name in ("faces", "vertices")}
-        kinds.setdefault(i if kind is None else kind, []).append((sizes.get("faces", 0), sizes.get("vertices", 0), i))
+        mesh = {part.name: part.of(arrays[part.leaf]) for part in parts}
+        kind, sizes = _kind(settings, parts, mesh), [mesh[name].size // 3 if name in mesh else 0 for name in ("faces", "vertices")]
+        kinds.setdefault(i if kind is None else kind, []).append((*sizes, i))
     pixels = spec.width * spec.height
     return sorted(group for members in kinds.values() for group in groups_by_size(members, pixels))
 
