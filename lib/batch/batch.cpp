@@ -34,6 +34,19 @@ View neutral_view() {
   return view;
 }
 
+/// Throws InvalidArgument, which says of which view, for lights that a renderer refuses.
+void check_lights_of_views(const Renderer::Impl& m, std::span<const Lights> lights) {
+  for (std::size_t view = 0; view < lights.size(); ++view) {
+    try {
+      check_lights(m.scene, m.views, lights[view]);
+    } catch (const InvalidArgument& error) {
+      if (lights.size() == 1) throw;
+      throw InvalidArgument(error.argument() + " (view " + std::to_string(view) + ")", error.got(),
+                            error.expected());
+    }
+  }
+}
+
 /// Smoothing, lights and views, each of which its setter checks against the others. Until all are set some
 /// are those of the renderer's last batch, which need not go with these.
 void upload_settings(Renderer& renderer, std::span<const View> views, std::span<const Lights> lights,
@@ -41,7 +54,7 @@ void upload_settings(Renderer& renderer, std::span<const View> views, std::span<
   Renderer::Impl& m = impl_of(renderer);
   const auto set = [&] {
     if (m.scene.smoothing != smoothing) renderer.set_smoothing(smoothing);
-    for (const Lights& of_view : lights) check_lights(m.scene, m.views, of_view);
+    check_lights_of_views(m, lights);
     if (!lights.empty() || m.scene.lights) m.set_lights(lights);
     renderer.set_views(views, first_view);
   };
@@ -99,7 +112,8 @@ void write_output(const std::vector<AuxiliaryOutputs>& views, const NamedArray& 
       write_view(from.barycentrics, static_cast<glm::vec3*>(output.data) + v * pixels);
     } else if (output.name == "uv") {
       if (from.uv.empty())
-        throw InvalidArgument("outputs (batch)", "uv", "an output of meshes without texture coordinates");
+        throw InvalidArgument("outputs (batch)", "uv of a mesh without texture coordinates",
+                              "texture coordinates on all meshes");
       write_view(from.uv, static_cast<glm::vec2*>(output.data) + v * pixels);
     } else {
       write_view(from.effective_faces, static_cast<float*>(output.data) + v * pixels);

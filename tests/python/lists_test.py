@@ -188,10 +188,14 @@ class ListsTest(unittest.TestCase):
         self.assert_close(np.sum(tangent[0].astype(np.float64) * grad),
                           np.sum(pullback(grad)["vertices"].astype(np.float64) * moved[0]), 1e-5, "adjoint")
 
-    def test_lights_of_too_few_views(self):
+    def test_wrong_lights_of_views(self):
         with self.assertRaisesRegex(ValueError, r"lights.point .*got \[3, 2, 9\], expected .*\[4, L, 9\] of each view"):
             dpr.render(VERTICES[0], FACES[0], VIEWS, LENS, width=SIZE, height=SIZE,
                        lights={"point": LIGHTS_OF_VIEWS["point"][:3]})
+        wrong = LIGHTS_OF_VIEWS["spot"].copy()
+        wrong[2, 0, 6] = 500
+        with self.assertRaisesRegex(ValueError, r"angle_degrees \(lights.spot\[0\]\) \(view 2\): got"):
+            dpr.render(VERTICES[0], FACES[0], VIEWS, LENS, width=SIZE, height=SIZE, lights={"spot": wrong})
 
     def test_outputs(self):
         outputs = ["face_id", "barycentrics", "effective_faces"]

@@ -232,7 +232,7 @@ class TexturesTest(RenderTest):
         _, outputs = dpr.render(wall, faces, views, intrinsics, width=SIZE, height=SIZE, texcoords=corners,
                                 textures=random(2, 2, 3), outputs=["uv", "barycentrics"])
         self.assert_same(outputs["uv"], outputs["barycentrics"] @ corners, 1e-5)
-        with self.assertRaisesRegex(RuntimeError, "outputs .* got uv, expected an output of meshes without"):
+        with self.assertRaisesRegex(RuntimeError, "outputs .* got uv of a mesh without texture coordinates"):
             dpr.render(wall, faces, views, intrinsics, width=SIZE, height=SIZE, outputs=["uv"])
 
     def test_wrong_arguments(self):
