@@ -64,8 +64,9 @@ static inline Vec3n material_backward(const Surface s, const LightingParams lp,
                                       global const Light* restrict lights, const LitFragment f,
                                       MaterialGradients* g, realn* grad_bary1, realn* grad_bary2) {
   const Shaded shaded = shade_fragment(s, lp, lights, f.c1, f.c2, f.base);
-  const Vec3n grad_base = mul3n(f.grad, shaded.lit.factor), grad_specular = mul3n(f.grad, splat3(s.material));
-  g->coefficient = mad3n(mul3n(f.grad, shaded.lit.specular), (realn)(1.0f), g->coefficient);
+  const Vec3n grad_base = mul3n(f.grad, shaded.lit.factor),
+              grad_specular = mul3n(f.grad, splat3(coefficient_of(s.material)));
+  g->coefficient = mad3n(mul3n(f.grad, by_coefficient(shaded)), (realn)(1.0f), g->coefficient);
   g->shininess += dot3n(grad_specular, shaded.lit.by_shininess);
   *grad_bary1 = *grad_bary2 = 0.0f;
   if (DPR_BASE == DPR_BASE_OF_CORNERS) {
@@ -91,8 +92,8 @@ static inline void place_backward(const Surface s, const LightingParams lp,
   const SurfacePoint at = point_on(s, f.c1, f.c2, f.base);
   PointGradient point = zero_point_gradient();
   point.eye = g->eye;
-  light_point_backward(lp, lights, s.material.w, s.eye, at.position, at.normal, mul3n(f.grad, at.base),
-                       mul3n(f.grad, splat3(s.material)), &point);
+  light_point_backward(lp, lights, s.material, s.eye, at.position, at.normal, mul3n(f.grad, at.base),
+                       mul3n(f.grad, splat3(coefficient_of(s.material))), &point);
   g->eye = point.eye;
   const Vec3n grad_normal = normalize3n_backward(at.normal, at.inverse_normal, point.normal);
   add_corners(g->position, point.position, f.c1, f.c2);
@@ -109,7 +110,7 @@ static inline void corners_backward(const Surface s, const LightingParams lp,
   for (int k = 0; k < 3; ++k) {
     PointGradient point = zero_point_gradient();
     point.eye = g->eye;
-    light_point_backward(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], of.factor[k],
+    light_point_backward(lp, lights, s.material, s.eye, s.position[k], s.normal[k], of.factor[k],
                          of.specular[k], &point);
     g->position[k] = point.position;
     g->normal[k] = point.normal;

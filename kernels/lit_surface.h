@@ -15,7 +15,7 @@
 /// A triangle's corners: colours, world positions, normals; and for Gouraud the light there.
 typedef struct {
   Vec3n color[3], position[3], normal[3], factor[3], specular[3], by_shininess[3];
-  float4 eye, material;  // RGB of the specular coefficient, shininess
+  float4 eye, material;  // RGB of the specular coefficient (microfacet: F0), shininess
 } Surface;
 
 /// The face's own normal, of length one.
@@ -56,7 +56,7 @@ static inline Surface load_surface(const FrameParams p, const LightingParams lp,
       s.normal[k] = splat3(normals[normal[k]]);
     }
     if (DPR_SHADING == DPR_GOURAUD) {
-      const Lit lit = light_point(lp, lights, s.material.w, s.position[k], s.normal[k], s.eye);
+      const Lit lit = light_point(lp, lights, s.material, s.position[k], s.normal[k], s.eye);
       s.factor[k] = lit.factor;
       s.specular[k] = lit.specular;
       s.by_shininess[k] = lit.by_shininess;
@@ -100,9 +100,18 @@ static inline Shaded shade_fragment(const Surface s, const LightingParams lp,
     f.lit.specular = interpolate3(s.specular, c1, c2);
     f.lit.by_shininess = interpolate3(s.by_shininess, c1, c2);
   } else {
-    f.lit = light_point(lp, lights, s.material.w, f.at.position, f.at.normal, s.eye);
+    f.lit = light_point(lp, lights, s.material, f.at.position, f.at.normal, s.eye);
   }
   return f;
+}
+
+/// Derivative of the colour with respect to the material's specular coefficient, channel by channel.
+static inline Vec3n by_coefficient(const Shaded f) {
+#if DPR_SHADING == DPR_MICROFACET
+  return mad3n(mul3n(f.at.base, f.lit.factor_by_straight), (realn)(1.0f), f.lit.specular_by_straight);
+#else
+  return f.lit.specular;
+#endif
 }
 
 /// Values of three planes that are in the run; 0 in the other lanes. Those of the first are from `first` on.

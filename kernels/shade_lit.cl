@@ -1,5 +1,5 @@
 // Fragment colours with lights: base colour * factor + material * specular, where factor and specular come
-// from the light at the fragment (flat, Phong, Blinn) or interpolate those at the corners (Gouraud).
+// from the light at the fragment (flat, Phong, Blinn, microfacet) or interpolate those at the corners (Gouraud).
 // DPR_SHADING says which, DPR_LIGHTS in what lights, and DPR_BASE whether the base colour is interpolated
 // here or comes from the surface stage. Loops over the corners are unrolled, as in geometry.h.
 #include "lit_backward.h"
@@ -10,8 +10,8 @@
 /// in   lights  Light[view, or none where they share them][row]  an Environment, then the lights
 /// in   faces   uint4[...][face]       vertex indices; those of colours, w = material; those of normals
 /// in   world   float4[view][vertex], then float4[view][normal], which flat shading does not read
-/// in   materials  float4[material]    RGB of the specular coefficient; w = shininess, or that of the lights
-///      where it is below 1
+/// in   materials  float4[material]    RGB of the specular coefficient (microfacet: F0); w = shininess, or that of
+///      the lights where it is below 1
 /// in out  fragments  float[plane][fragment]  COLOR by BARY, and by BASE where DPR_BASE says so; the colours
 ///      are not read, then
 kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, global const uint* restrict pairs,
@@ -30,9 +30,10 @@ kernel void shade_lit_forward(const FrameParams p, const LightingParams lp, glob
     const realn c1 = load_n(bary, fragments), c2 = load_n(bary + p.fragments, fragments);
     const Vec3n base = load_base(p, lanes_before(last, i), i, fragments);
     const Shaded f = shade_fragment(s, lp, lights, c1, c2, base);
-    store_run3(f.at.base.x * f.lit.factor.x + s.material.x * f.lit.specular.x,
-               f.at.base.y * f.lit.factor.y + s.material.y * f.lit.specular.y,
-               f.at.base.z * f.lit.factor.z + s.material.z * f.lit.specular.z, i, last, DPR_PLANE(p, COLOR),
+    const float4 coefficient = coefficient_of(s.material);
+    store_run3(f.at.base.x * f.lit.factor.x + coefficient.x * f.lit.specular.x,
+               f.at.base.y * f.lit.factor.y + coefficient.y * f.lit.specular.y,
+               f.at.base.z * f.lit.factor.z + coefficient.z * f.lit.specular.z, i, last, DPR_PLANE(p, COLOR),
                p.fragments, fragments);
   }
 }
@@ -158,13 +159,12 @@ static inline LightSums zero_light_sums(void) {
 
 /// Adds those at a point in the light; `l` is the light.
 static inline void add_light_sums(const LightingParams lp, uint l, global const Light* restrict lights,
-                                  float shininess, float4 eye, Vec3n position, Vec3n normal,
+                                  float4 material, float4 eye, Vec3n position, Vec3n normal,
                                   Vec3n grad_factor, Vec3n grad_specular, LightSums* sums) {
   if ((DPR_LIGHTS & DPR_LIGHTS_HARMONICS) && l == 0)
     add_harmonics_gradient(normal, grad_factor, sums->harmonics);
   if (l < lp.lights)
-    add_light_gradient(lights + l, shininess, eye, position, normal, grad_factor, grad_specular,
-                       &sums->light);
+    add_light_gradient(lights + l, material, eye, position, normal, grad_factor, grad_specular, &sums->light);
 }
 
 /// The environment's channels go before those of the lights.
@@ -202,17 +202,18 @@ kernel void shade_lit_backward_lights(
     const LitFragment f = load_fragment(p, last, i, fragments, grads);
     // point_on() is enough, but inlined here it takes CPUs twice as long.
     const SurfacePoint at = shade_fragment(s, lp, lights, f.c1, f.c2, f.base).at;
-    const Vec3n grad_factor = mul3n(f.grad, at.base), grad_specular = mul3n(f.grad, splat3(s.material));
+    const Vec3n grad_factor = mul3n(f.grad, at.base),
+                grad_specular = mul3n(f.grad, splat3(coefficient_of(s.material)));
     sums.ambient = mad3n(grad_factor, (realn)(1.0f), sums.ambient);
     if (DPR_SHADING != DPR_GOURAUD) {
-      add_light_sums(lp, light, lights, s.material.w, s.eye, at.position, at.normal, grad_factor,
-                     grad_specular, &sums);
+      add_light_sums(lp, light, lights, s.material, s.eye, at.position, at.normal, grad_factor, grad_specular,
+                     &sums);
       continue;
     }
     const realn c[3] = {1.0f - f.c1 - f.c2, f.c1, f.c2};
 #pragma unroll
     for (int k = 0; k < 3; ++k) {
-      add_light_sums(lp, light, lights, s.material.w, s.eye, s.position[k], s.normal[k],
+      add_light_sums(lp, light, lights, s.material, s.eye, s.position[k], s.normal[k],
                      scale3n(grad_factor, c[k]), scale3n(grad_specular, c[k]), &sums);
     }
   }

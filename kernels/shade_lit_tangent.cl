@@ -32,7 +32,7 @@ static inline Vec3n only3n(Vec3n v, int channel) {
 /// Adds the gradients of the channels from `first` on of base * factor + coefficient * specular, through the light at
 /// a point.
 static inline void light_point_rows(const LightingParams lp, global const Light* restrict lights,
-                                    float shininess, float4 eye, Vec3n position, Vec3n normal, Vec3n base,
+                                    float4 material, float4 eye, Vec3n position, Vec3n normal, Vec3n base,
                                     Vec3n coefficient, int first, PointGradient* point) {
   if (DPR_LIGHTS & DPR_LIGHTS_HARMONICS) {
 #pragma unroll
@@ -41,10 +41,10 @@ static inline void light_point_rows(const LightingParams lp, global const Light*
   }
   LightGradient unused = zero_light_gradient();
   for (uint l = 0; l < lp.lights; ++l) {
-    const LightTerm t = light_term(position, normal, eye, lights + l, shininess);
+    const LightTerm t = light_term(position, normal, eye, lights + l, material);
 #pragma unroll
     for (int k = 0; k < DPR_CHANNELS_AT_ONCE; ++k) {
-      light_term_backward(t, eye, lights + l, shininess, normal, only3n(base, first + k),
+      light_term_backward(t, eye, lights + l, material, normal, only3n(base, first + k),
                           only3n(coefficient, first + k), point + k, &unused);
     }
   }
@@ -66,11 +66,11 @@ static inline void rows_of_points(const Surface s, const LightingParams lp,
     }
     if (DPR_SHADING == DPR_GOURAUD) {
       const realn share = k == 0 ? 1.0f - c1 - c2 : k == 1 ? c1 : c2;
-      light_point_rows(lp, lights, s.material.w, s.eye, s.position[k], s.normal[k], scale3n(at.base, share),
+      light_point_rows(lp, lights, s.material, s.eye, s.position[k], s.normal[k], scale3n(at.base, share),
                        scale3n(splat3(s.material), share), first, g);
     } else {
-      light_point_rows(lp, lights, s.material.w, s.eye, at.position, at.normal, at.base, splat3(s.material),
-                       first, g);
+      light_point_rows(lp, lights, s.material, s.eye, at.position, at.normal, at.base,
+                       splat3(coefficient_of(s.material)), first, g);
     }
 #pragma unroll
     for (int channel = 0; channel < DPR_CHANNELS_AT_ONCE; ++channel) {

@@ -73,6 +73,7 @@
 #define DPR_PHONG 2
 #define DPR_GOURAUD 3
 #define DPR_BLINN 4
+#define DPR_MICROFACET 5
 
 /// Kinds of lights beyond points that kernels are built for: bits of DPR_LIGHTS.
 #define DPR_LIGHTS_DISTANT 1   /* infinitely far away: position.w is 0 */

@@ -129,7 +129,7 @@ typedef struct dpr_texture {
 /* The texture of a face that has none. */
 #define DPR_TEXTURE_NONE UINT32_MAX
 
-/* Highlights of a surface: those of the lights are multiplied by `specular`. */
+/* Highlights of a surface: those of the lights are multiplied by `specular` (microfacet: its F0). */
 typedef struct dpr_material {
   float specular[3];
   float shininess; /* >= 1; 0: that of the lights */
@@ -173,7 +173,8 @@ typedef enum dpr_shading {
   DPR_SHADING_FLAT = 0,
   DPR_SHADING_PHONG = 1,
   DPR_SHADING_GOURAUD = 2,
-  DPR_SHADING_BLINN = 3
+  DPR_SHADING_BLINN = 3,
+  DPR_SHADING_MICROFACET = 4 /* glTF's reflection: dpr/light.hpp */
 } dpr_shading;
 
 /* World space, without attenuation. */

@@ -10,8 +10,8 @@
 namespace dpr {
 
 /// Evaluation of lighting: per face, per fragment with interpolated normals, or per vertex; blinn is as
-/// phong, with Blinn's highlight.
-enum class Shading { flat, phong, gouraud, blinn };
+/// phong, with Blinn's highlight, and microfacet as phong, with glTF's reflection.
+enum class Shading { flat, phong, gouraud, blinn, microfacet };
 
 /// A point light in world space, without attenuation.
 struct PointLight {
@@ -47,6 +47,14 @@ inline constexpr std::size_t k_harmonics = 9;
 /// n.h, h = (l + v) / |l + v| (Blinn 1977). Materials (dpr/mesh.hpp) multiply the highlights and may have an
 /// exponent of their own. Normals follow the winding of the faces, unless the mesh gives some, and are not
 /// turned to the viewer.
+///
+/// microfacet is the reflection of glTF 2.0, appendix B: Lambert, GGX's distribution D, Smith's masking V, Schlick's
+/// Fresnel term F = F0 + (1 - F0) (1 - v.h)^5. colour = base * (ambient + environment + sum_l a_l diffuse_l max(n.l, 0)
+/// (1 - F)) + sum_l a_l specular_l pi D V max(n.l, 0) F. F0, the reflectance at normal incidence, is the material's
+/// specular: 1 without materials, a white metal, on which lights have no diffuse part. D and V have alpha^2 = 2 /
+/// (shininess + 1), at least 1e-6; the least shininess, 1, is glTF's roughness 1. A light's diffuse and specular are
+/// its irradiance over pi. metallic_roughness() (dpr/mesh.hpp) makes colours and materials. A surface seen from behind
+/// reflects as one seen edge-on, and such reflection begins steeply at n.l = 0.
 ///
 /// The environment is distant light of radiance sum L_lm Y_lm(w) from the direction w, and what a white
 /// diffuse surface reflects of it (Ramamoorthi and Hanrahan 2001): sum a_l L_lm Y_lm(n), a = 1, 2/3, 1/4,

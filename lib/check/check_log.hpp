@@ -55,6 +55,8 @@ class CheckLog {
 void check_lists(const Device& device, CheckLog& log);
 /// Vertices, fragments, colours and occupancies of a frame, stage by stage, its image, and all gradients.
 void check_frame(const Device& device, CheckLog& log);
+/// Rough surfaces in lights of every kind.
+void check_microfacets(const Device& device, CheckLog& log);
 /// Triangles that the near plane cuts.
 void check_clipping(const Device& device, CheckLog& log);
 /// The exact aggregation of every prior in both compositions.

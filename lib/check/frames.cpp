@@ -1,4 +1,4 @@
-// Self-test of a frame's stages, of what the near plane cuts, and of the exact aggregation.
+// Self-test of a frame's stages, of rough surfaces, of what the near plane cuts, and of the exact aggregation.
 #include <array>
 #include <map>
 #include <optional>
@@ -159,6 +159,18 @@ void check_frame(const Device& device, CheckLog& log) {
   log_fragments(t, prepared, log);
   log.add("aggregate", "image, RGBA", image_difference(t), k_image);
   log_gradients(t, log);
+}
+
+void check_microfacets(const Device& device, CheckLog& log) {
+  Scene scene = scene_of(make_icosphere(1, 1.3F), 18, 18);
+  scene.lights = every_light(Shading::microfacet);
+  scene.meshes[0].mesh.materials = materials_for(Shading::microfacet);
+  scene.gradients.lights = true;
+  Twins t(device, scene);
+  log.add("shade", "image of a rough metal, RGBA", image_difference(t), k_image);
+  Largest worst;
+  for (const Block& block : gradient_blocks(t)) worst.add(block_error(block, k_gradient));
+  log.add("shade, backward", "all gradients of a rough metal, relative", worst.value(), k_gradient);
 }
 
 void check_clipping(const Device& device, CheckLog& log) {

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
@@ -125,6 +127,15 @@ inline Scene textured_scene(Mesh mesh, Texture texture, int width, int height) {
   Scene scene = scene_of(textured(std::move(mesh), std::move(texture)), width, height);
   scene.gradients.texture = scene.gradients.texcoords = true;
   return scene;
+}
+
+inline constexpr std::array k_every_shading{Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn,
+                                            Shading::microfacet};
+
+/// Materials by which a shading shows all that it has: without any, microfacet's lights scatter nothing.
+inline std::vector<Material> materials_for(Shading shading) {
+  if (shading != Shading::microfacet) return {};
+  return {{{0.7F, 0.3F, 0.1F}, std::nullopt}};
 }
 
 inline Lights two_lights(Shading shading) {

@@ -16,6 +16,7 @@ struct Part {
 constexpr std::array k_parts{
     Part{"scan, sort, reduce", check_lists},
     Part{"transform to aggregate", check_frame},
+    Part{"shade", check_microfacets},
     Part{"clip", check_clipping},
     Part{"aggregate", check_aggregation},
     Part{"sampled stages", check_sampling},

@@ -39,6 +39,10 @@ void check_tangents(const Device& device, CheckLog& log) {
   const Scene cut = scene_cut_open(welded_cube(), 24, 20);
   log_adjoint(device, with(textured, "joint_gaussian", every_light(Shading::phong)),
               "joint, texture, Phong: relative", log);
+  Scene rough = scene_of(make_icosphere(1), 24, 20);
+  rough.meshes[0].mesh.materials = materials_for(Shading::microfacet);
+  log_adjoint(device, with(rough, "joint_gaussian", every_light(Shading::microfacet)),
+              "joint, rough metal: relative", log);
   log_adjoint(device, with(cut, "gaussian", std::nullopt), "barrier, near plane: relative", log);
   log_adjoint(device, with(cut, "pixel", two_lights(Shading::gouraud)),
               "noise on the pixel, near plane, Gouraud: relative", log);

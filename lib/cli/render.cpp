@@ -218,9 +218,9 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->type_name("none|back|front");
   command
       ->add_option("--shading", options->shading,
-                   "Evaluation of light: by face (flat), vertex (gouraud) or pixel (phong, the default, and "
-                   "blinn); instead of the scene's")
-      ->type_name("flat|gouraud|phong|blinn");
+                   "Evaluation of light: by face (flat), vertex (gouraud) or pixel (phong, the default, "
+                   "blinn and microfacet); instead of the scene's")
+      ->type_name("flat|gouraud|phong|blinn|microfacet");
   command
       ->add_option("--elevation", options->elevation,
                    "Degrees above the horizon of the camera fitted to MESH; 25 by default")

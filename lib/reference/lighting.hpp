@@ -6,9 +6,13 @@
 /// l, v: unit vectors to the light and to the camera; a_l: what comes through a spot's cone; m = v.r,
 /// r = 2 (n.l) n - l (Phong 1975), or n.h, h the direction of l + v (Blinn 1977). Normals are not turned to
 /// the viewer. The environment is the irradiance over pi of radiance given by spherical harmonics
-/// (Ramamoorthi and Hanrahan 2001).
+/// (Ramamoorthi and Hanrahan 2001). Microfacet shading is glTF's (microfacet.hpp), F being Schlick's term:
+///
+///     colour = base * (ambient + environment + sum_l a_l diffuse_l max(n.l, 0) (1 - F))
+///            + sum_l a_l specular_l pi D V max(n.l, 0) F
 #pragma once
 
+#include "microfacet.hpp"
 #include "vec.hpp"
 
 #include <algorithm>
@@ -20,9 +24,9 @@
 
 namespace dpr::reference {
 
-/// flat: the normal of the face; phong, blinn: vertex normals interpolated; all at the fragment's
+/// flat: the normal of the face; phong, blinn, microfacet: vertex normals interpolated; all at the fragment's
 /// interpolated world position. gouraud: light at the vertices, interpolated.
-enum class Shading { flat, phong, gouraud, blinn };
+enum class Shading { flat, phong, gouraud, blinn, microfacet };
 
 struct PointLight {
   Vec3d position;  ///< world space
@@ -53,6 +57,8 @@ struct Lights {
   std::vector<DirectionalLight> directional;
   std::vector<SpotLight> spot;
   std::vector<Vec3d> harmonics;  ///< 9, or none
+  /// Of the lit surface at normal incidence, in microfacet shading: F0.
+  Vec3d reflectance{1.0, 1.0, 1.0};
 };
 
 /// visit(name, value) for every vector and number of the lights that has a gradient.
@@ -201,6 +207,15 @@ inline double highlight_base(Shading shading, const Vec3d& l, const Vec3d& v, co
   return shading == Shading::blinn ? dot(n, unit(l + v)) : dot(v, 2.0 * dot(n, l) * n - l);
 }
 
+/// Cosines n.l, n.v, n.h and v.h.
+inline std::array<double, 4> cosines_of(const Vec3d& n, const Vec3d& l, const Vec3d& v) {
+  const Vec3d h = unit(l + v);
+  return {dot(n, l), dot(n, v), dot(n, h), dot(v, h)};
+}
+
+/// 1 - F0, channel by channel.
+inline Vec3d scattered_share(const Lights& lights) { return Vec3d{1.0, 1.0, 1.0} - lights.reflectance; }
+
 template <class Light>
 void add_light(const Lights& lights, const Light& light, const Vec3d& v, const Vec3d& position,
                const Vec3d& normal, LightTerms& terms) {
@@ -208,6 +223,13 @@ void add_light(const Lights& lights, const Light& light, const Vec3d& v, const V
   const Vec3d l = unit(ray.way);
   const double cosine = dot(normal, l);
   if (!(cosine > 0.0)) return;
+  if (lights.shading == Shading::microfacet) {
+    const Reflection r = reflection(cosines_of(normal, l, v), lights.shininess);
+    terms.factor += ray.through * r.scattered.value * light.diffuse * scattered_share(lights);
+    terms.specular += ray.through * (r.straight.value * lights.reflectance * light.specular +
+                                     r.grazing.value * light.specular);
+    return;
+  }
   terms.factor += ray.through * cosine * light.diffuse;
   const double base = highlight_base(lights.shading, l, v, normal);
   if (base > 0.0) terms.specular += ray.through * std::pow(base, lights.shininess) * light.specular;
@@ -247,6 +269,41 @@ inline HighlightGradient highlight_backward(Shading shading, const Vec3d& l, con
   return {2.0 * facing * n - v, 2.0 * cosine * n - l, 2.0 * (facing * l + cosine * v)};
 }
 
+/// Gradient of a light's reflection to its directions, to the normal and to what comes through.
+struct ReflectionGradient {
+  Vec3d l, v, n;
+  double through = 0.0;
+};
+
+template <class Light>
+ReflectionGradient reflection_backward(const Lights& lights, const Light& light, double through,
+                                       const Vec3d& l, const Vec3d& v, const Vec3d& n, const LightTerms& grad,
+                                       Light& total) {
+  const Reflection r = reflection(cosines_of(n, l, v), lights.shininess);
+  const Vec3d by_diffuse = grad.factor * scattered_share(lights),
+              by_straight = grad.specular * lights.reflectance;
+  total.diffuse += through * r.scattered.value * by_diffuse;
+  total.specular += through * (r.straight.value * by_straight + r.grazing.value * grad.specular);
+  const Dual sum = Dual{dot(by_diffuse, light.diffuse)} * r.scattered +
+                   Dual{dot(by_straight, light.specular)} * r.straight +
+                   Dual{dot(grad.specular, light.specular)} * r.grazing;
+  const auto [by_light, by_eye, by_half, by_both] = sum.slope;
+  const Vec3d h = unit(l + v), grad_sum = unit_backward(l + v, by_half * n + by_both * v);
+  return {through * (by_light * n + grad_sum), through * (by_eye * n + by_both * h + grad_sum),
+          through * (by_light * l + by_eye * v + by_half * h), sum.value};
+}
+
+/// Adds the gradients by way of a light's direction and the direction to the camera.
+template <class Light>
+void add_ways_backward(const Light& light, const Ray& ray, const Vec3d& camera, const Vec3d& position,
+                       const ReflectionGradient& grad, SurfaceGradient& surface, Light& total) {
+  surface.position += ray_backward(light, position, {unit_backward(ray.way, grad.l), grad.through}, total);
+  const Vec3d grad_to_camera = unit_backward(camera - position, grad.v);
+  surface.normal += grad.n;
+  surface.camera += grad_to_camera;
+  surface.position += -grad_to_camera;
+}
+
 template <class Light>
 void add_light_backward(const Lights& lights, const Light& light, const Vec3d& camera, const Vec3d& position,
                         const Vec3d& normal, const LightTerms& grad, SurfaceGradient& surface, Light& total) {
@@ -254,26 +311,27 @@ void add_light_backward(const Lights& lights, const Light& light, const Vec3d& c
   const Vec3d l = unit(ray.way), v = unit(camera - position);
   const double cosine = dot(normal, l);
   if (!(cosine > 0.0)) return;
+  if (lights.shading == Shading::microfacet) {
+    const ReflectionGradient ways =
+        reflection_backward(lights, light, ray.through, l, v, normal, grad, total);
+    return add_ways_backward(light, ray, camera, position, ways, surface, total);
+  }
   total.diffuse += ray.through * cosine * grad.factor;
   const double by_diffuse = dot(grad.factor, light.diffuse), by_specular = dot(grad.specular, light.specular);
-  double grad_through = by_diffuse * cosine;
-  Vec3d grad_l = ray.through * by_diffuse * normal, grad_v;
-  surface.normal += ray.through * by_diffuse * l;
+  ReflectionGradient ways{
+      ray.through * by_diffuse * normal, {}, ray.through * by_diffuse * l, by_diffuse * cosine};
   const double base = highlight_base(lights.shading, l, v, normal);
   if (base > 0.0) {
     const double highlight = std::pow(base, lights.shininess);
     total.specular += ray.through * highlight * grad.specular;
-    grad_through += by_specular * highlight;
+    ways.through += by_specular * highlight;
     const double grad_base = ray.through * by_specular * lights.shininess * highlight / base;
     const HighlightGradient g = highlight_backward(lights.shading, l, v, normal);
-    grad_l += grad_base * g.l;
-    grad_v += grad_base * g.v;
-    surface.normal += grad_base * g.n;
+    ways.l += grad_base * g.l;
+    ways.v += grad_base * g.v;
+    ways.n += grad_base * g.n;
   }
-  surface.position += ray_backward(light, position, {unit_backward(ray.way, grad_l), grad_through}, total);
-  const Vec3d grad_to_camera = unit_backward(camera - position, grad_v);
-  surface.camera += grad_to_camera;
-  surface.position += -grad_to_camera;
+  add_ways_backward(light, ray, camera, position, ways, surface, total);
 }
 
 inline SurfaceGradient light_terms_backward(const Lights& lights, const Vec3d& camera, const Vec3d& position,

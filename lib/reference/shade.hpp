@@ -20,20 +20,20 @@ namespace dpr::reference {
 struct ShadeGradient {
   std::vector<Vec3d> world;              ///< world positions of the vertices
   std::vector<Vec3d> face_normals;       ///< unit normals, flat
-  std::vector<Vec3d> vertex_normals;     ///< unit normals, phong and gouraud
+  std::vector<Vec3d> vertex_normals;     ///< unit normals, but in flat shading
   std::vector<LightTerms> vertex_light;  ///< gouraud
   Vec3d camera;
   Lights lights = zero_like({});  ///< every number but shininess
 };
 
-/// Factor of the highlights, and their exponent if it is above 0.
+/// Factor of the highlights (microfacet: F0), and their exponent if it is above 0.
 struct Material {
   Vec3d specular{1.0, 1.0, 1.0};
   double shininess = 0.0;
 };
 
-/// A face's material, and the world-space unit normals of its corners if the mesh gives normals. Their
-/// gradients are compared with finite differences instead.
+/// A face's material, and the world-space unit normals of its corners if the mesh gives normals. Their gradients, and
+/// of lights' specular under materials but in microfacet shading, are compared with finite differences instead.
 struct FaceLook {
   Material material;
   std::optional<std::array<Vec3d, 3>> normals;
@@ -119,9 +119,13 @@ inline Lights face_lights(const ShadeScene& scene, std::size_t face) {
   const auto apply = [&](auto& list) {
     for (auto& light : list) light.specular = light.specular * material.specular;
   };
-  apply(lights.point);
-  apply(lights.directional);
-  apply(lights.spot);
+  if (lights.shading == Shading::microfacet) {
+    lights.reflectance = material.specular;
+  } else {
+    apply(lights.point);
+    apply(lights.directional);
+    apply(lights.spot);
+  }
   if (material.shininess > 0.0) lights.shininess = material.shininess;
   return lights;
 }
@@ -219,8 +223,8 @@ inline Vec3d fragment_light_backward(const ShadeScene& scene, std::size_t face_i
   const bool flat = scene.lights->shading == Shading::flat;
   const Vec3d normal_sum = flat ? scene.face_areas[face_index] : fragment_normal_sum(scene, face_index, c);
   const SurfaceGradient surface =
-      light_terms_backward(*scene.lights, scene.camera, fragment_position(scene, face, c), unit(normal_sum),
-                           grad_light, total.lights);
+      light_terms_backward(face_lights(scene, face_index), scene.camera, fragment_position(scene, face, c),
+                           unit(normal_sum), grad_light, total.lights);
   total.camera += surface.camera;
   if (flat) total.face_normals[face_index] += surface.normal;
   const Vec3d grad_sum = flat ? Vec3d{} : unit_backward(normal_sum, surface.normal);

@@ -15,7 +15,8 @@
 namespace dpr {
 
 /// Names in files, in the order of the enumeration.
-inline constexpr std::array<std::string_view, 4> k_shadings{"flat", "phong", "gouraud", "blinn"};
+inline constexpr std::array<std::string_view, 5> k_shadings{"flat", "phong", "gouraud", "blinn",
+                                                            "microfacet"};
 
 /// A kind has
 /// - key, lights, gradients: its list in files, in Lights and in SceneGradient

@@ -1677,6 +1677,8 @@ static void test_wrong_scenes(void) {
   OK(dpr_scene_set_lights(scene, &lights));
   lights.size = sizeof lights;
   lights.spot_count = 0;
+  lights.shading = DPR_SHADING_MICROFACET;
+  OK(dpr_scene_set_lights(scene, &lights));
   lights.shading = 7;
   REFUSED(dpr_scene_set_lights(scene, &lights), "lights.shading");
   OK(dpr_scene_set_lights(scene, NULL));

@@ -155,6 +155,7 @@ TEST_SUITE("pipeline") {
     const std::string flat = render("flat"), phong = render("phong");
     CHECK(flat != phong);
     CHECK(phong != render("gouraud"));
+    CHECK(phong != render("microfacet"));
     folder.write("dark.json", scene(""));
     dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
     const auto dark =

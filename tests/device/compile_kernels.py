@@ -23,7 +23,7 @@ LANES = [1, 8, 16]
 MOST_ARGUMENTS = 14
 # Unlit surfaces are shade.cl's. One kind of light a time, none, and all.
 SHADING = [[f"-DDPR_SHADING={shading}", f"-DDPR_LIGHTS={lights}", f"-DDPR_BASE={base}"]
-           for shading, lights, base in itertools.product([1, 2, 3, 4], [0, 1, 2, 4, 7], ["DPR_BASE_OF_CORNERS", "DPR_BASE_OF_FRAGMENTS"])]
+           for shading, lights, base in itertools.product([1, 2, 3, 4, 5], [0, 1, 2, 4, 7], ["DPR_BASE_OF_CORNERS", "DPR_BASE_OF_FRAGMENTS"])]
 
 
 def priors(kernels):

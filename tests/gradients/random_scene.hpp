@@ -89,7 +89,7 @@ inline Mesh random_mesh(Draw& draw, Trial& trial) {
 
 inline void draw_lights(Draw& draw, Trial& trial) {
   if (!draw.chance(0.45F)) return;
-  const auto shading = draw.of({Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn});
+  const auto shading = check::k_every_shading[draw.below(check::k_every_shading.size())];
   trial.features.insert("lit " + std::string(k_shadings[static_cast<std::size_t>(shading)]));
   trial.scene.lights = draw.chance(0.5F) ? check::every_light(shading) : check::two_lights(shading);
   Mesh& mesh = trial.scene.meshes[0].mesh;

@@ -165,7 +165,7 @@ TEST_SUITE("robustness") {
     lights.spot[1].inner_angle_degrees = 0;
     CHECK_NOTHROW(validate(lights));
     lights.shading = static_cast<Shading>(7);
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud or blinn");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud, blinn or microfacet");
   }
 }
 

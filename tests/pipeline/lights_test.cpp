@@ -31,11 +31,10 @@ Scene sphere_scene(const std::optional<Lights>& lights) {
   return scene;
 }
 
-Image image_of(const std::optional<Lights>& lights) {
-  Renderer renderer(open_device());
-  renderer.set_scene(sphere_scene(lights));
-  renderer.forward();
-  return renderer.image();
+Image image_of(const Lights& lights) {
+  Scene scene = sphere_scene(lights);
+  scene.meshes[0].mesh.materials = materials_for(lights.shading);
+  return rendered(scene);
 }
 
 double largest_difference(const Image& a, const Image& b) {
@@ -99,7 +98,7 @@ Lights find(const Lights& truth, const Lights& start, int iterations) {
 
 TEST_SUITE("pipeline") {
   TEST_CASE("lights: a far point light is a directional one, a spot without cone a point light") {
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_every_shading) {
       CAPTURE(static_cast<int>(shading));
       const glm::vec3 way(0.5F, 1, 1.5F), diffuse(0.6F, 0.5F, 0.4F), specular(0.3F, 0.2F, 0.4F);
       Lights far = without_lights(shading), directional = far, near = far, spot = far, narrow = far;
@@ -144,8 +143,8 @@ TEST_SUITE("pipeline") {
     several.set_scene(sphere_scene({}));
     for (const std::optional<Lights>& lights :
          {std::optional(two_lights(Shading::phong)), std::optional(every_light(Shading::phong)),
-          std::optional(every_light(Shading::flat)), std::optional(without_lights()),
-          std::optional<Lights>()}) {
+          std::optional(every_light(Shading::flat)), std::optional(every_light(Shading::microfacet)),
+          std::optional(without_lights()), std::optional<Lights>()}) {
       renderer.set_lights(lights);
       several.set_lights(lights);
       CHECK(render(renderer).image.pixels == render(device, sphere_scene(lights)).image.pixels);

@@ -173,11 +173,12 @@ TEST_SUITE("pipeline") {
     Scene& orthographic = add("orthographic, joint", cube_scene(width, height));
     orthographic.camera.orthographic_height = 4.3F;
     orthographic.smoothing.composition = Composition::joint;
-    for (const Shading shading : {Shading::phong, Shading::blinn, Shading::gouraud}) {
+    for (const Shading shading : {Shading::phong, Shading::blinn, Shading::gouraud, Shading::microfacet}) {
       Scene& lit = add("orthographic, lit " + std::to_string(static_cast<int>(shading)),
                        scene_of(make_icosphere(reduced(1, 0), 1.3F), width, height));
       lit.camera.orthographic_height = 3.6F;
       lit.lights = every_light(shading);
+      lit.meshes[0].mesh.materials = materials_for(shading);
       lit.gradients.lights = true;
     }
     Scene textured =
@@ -206,15 +207,17 @@ TEST_SUITE("pipeline") {
   TEST_CASE("reference: lights, metrics, interpolation, coloured faces, the preset gaussian") {
     const int size = reduced(30, 7);
     std::vector<NamedScene> scenes;
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_every_shading) {
       const std::string name = "shading " + std::to_string(static_cast<int>(shading));
       Scene& cube = scenes.emplace_back(name + ", cube", cube_scene(size, size)).second;
       cube.lights = every_light(shading);
+      cube.meshes[0].mesh.materials = materials_for(shading);
       cube.gradients.lights = true;
       if (reduced(1, 0) == 0) continue;
       Scene& sphere =
           scenes.emplace_back(name + ", icosphere", scene_of(make_icosphere(1, 1.3F), size, size)).second;
       sphere.lights = two_lights(shading);
+      sphere.meshes[0].mesh.materials = materials_for(shading);
       sphere.gradients.lights = true;
       sphere.smoothing.composition = Composition::joint;
     }
@@ -258,7 +261,7 @@ TEST_SUITE("pipeline") {
                                                            random_texture(1, 4, wrap, filter), size, size));
       }
     }
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_every_shading) {
       Scene& lit =
           scenes
               .emplace_back("lit " + std::to_string(static_cast<int>(shading)),
@@ -266,6 +269,7 @@ TEST_SUITE("pipeline") {
                                            size, size))
               .second;
       lit.lights = every_light(shading);
+      lit.meshes[0].mesh.materials = materials_for(shading);
       lit.gradients.lights = true;
       lit.smoothing.composition = Composition::joint;
     }

@@ -111,12 +111,56 @@ std::vector<Direction> directions(const SceneGradient& g) {
       {"lights", light_numbers(g), [](reference::Scene& s, By by) { *s.lights = displaced(*s.lights, by); }}};
 }
 
+/// Gradients of materials and normals, requested alone, in three views, and by several devices.
+void check_alone(Shading shading) {
+  CAPTURE(static_cast<int>(shading));
+  const int size = reduced(20, 5);
+  const Scene scene = surface_scene(shading, size);
+  const Image weights = random_image(size, size, -1, 1);
+  const SceneGradient all = gradient_of(scene, weights);
+  for (bool GradientRequest::*const wanted : {&GradientRequest::normals, &GradientRequest::materials}) {
+    Scene alone = scene;
+    alone.gradients = no_gradients();
+    alone.gradients.*wanted = true;
+    const MeshGradient found = gradient_of(alone, weights).meshes[0];
+    const bool normals = wanted == &GradientRequest::normals;
+    CHECK(found.normals == (normals ? all.meshes[0].normals : std::vector<glm::vec3>()));
+    CHECK(found.specular == (normals ? std::vector<glm::vec3>() : all.meshes[0].specular));
+    CHECK(found.shininess == (normals ? std::vector<double>() : all.meshes[0].shininess));
+    CHECK(found.positions.empty());
+  }
+  Scene unlit = scene;
+  unlit.lights.reset();
+  const MeshGradient of_unlit = gradient_of(unlit, weights).meshes[0];
+  CHECK(of_unlit.normals.empty());
+  CHECK(of_unlit.specular.empty());
+  const std::vector<View> views(3,
+                                View{scene.camera, {scene.meshes[0].transform, scene.meshes[1].transform}});
+  const std::vector<Image> of_views(views.size(), weights);
+  Renderer one(open_device());
+  one.set_scene(scene);
+  one.set_views(views);
+  one.forward();
+  const SceneGradient three_times = one.backward(of_views);
+  const std::vector<double> single = flat(all.meshes[0].normals), sum = flat(three_times.meshes[0].normals);
+  for (std::size_t i = 0; i < sum.size(); ++i) CHECK(sum[i] == doctest::Approx(3 * single[i]).epsilon(1e-4));
+  CHECK(three_times.meshes[0].shininess[0] == doctest::Approx(3 * all.meshes[0].shininess[0]).epsilon(1e-4));
+  for (const ViewGradient& view : three_times.views)
+    CHECK(view.transforms[0].rotation == three_times.views[0].transforms[0].rotation);
+  MultiDeviceRenderer several(dpr::test::several_devices(2));
+  several.set_scene(scene);
+  several.set_views(views);
+  const SceneGradient of_several = several.gradient(of_views);
+  const std::vector<double> parts = flat(of_several.meshes[0].normals);
+  for (std::size_t i = 0; i < sum.size(); ++i) CHECK(parts[i] == doctest::Approx(sum[i]).epsilon(1e-4));
+}
+
 }  // namespace
 
 TEST_SUITE("pipeline") {
   TEST_CASE("materials and given normals: images are the reference's") {
     const int size = reduced(24, 7);
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_every_shading) {
       CAPTURE(static_cast<int>(shading));
       const Scene scene = surface_scene(shading, size);
       CHECK(largest_difference(rendered(scene), reference::render(to_reference(scene))) < 1e-4);
@@ -134,7 +178,7 @@ TEST_SUITE("pipeline") {
   TEST_CASE("materials and given normals: gradients are the reference's finite differences") {
     const int size = reduced(16, 5);
     const Image weights = random_image(size, size, -1, 1);
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_every_shading) {
       const Scene scene = surface_scene(shading, size);
       const SceneGradient gradient = gradient_of(scene, weights);
       CHECK(gradient.meshes[1].specular.empty());
@@ -154,47 +198,7 @@ TEST_SUITE("pipeline") {
   }
 
   TEST_CASE("materials and given normals: alone they have the same gradients, on several devices too") {
-    const int size = reduced(20, 5);
-    const Scene scene = surface_scene(Shading::phong, size);
-    const Image weights = random_image(size, size, -1, 1);
-    const SceneGradient all = gradient_of(scene, weights);
-    for (bool GradientRequest::*const wanted : {&GradientRequest::normals, &GradientRequest::materials}) {
-      Scene alone = scene;
-      alone.gradients = no_gradients();
-      alone.gradients.*wanted = true;
-      const MeshGradient found = gradient_of(alone, weights).meshes[0];
-      const bool normals = wanted == &GradientRequest::normals;
-      CHECK(found.normals == (normals ? all.meshes[0].normals : std::vector<glm::vec3>()));
-      CHECK(found.specular == (normals ? std::vector<glm::vec3>() : all.meshes[0].specular));
-      CHECK(found.shininess == (normals ? std::vector<double>() : all.meshes[0].shininess));
-      CHECK(found.positions.empty());
-    }
-    Scene unlit = scene;
-    unlit.lights.reset();
-    const MeshGradient of_unlit = gradient_of(unlit, weights).meshes[0];
-    CHECK(of_unlit.normals.empty());
-    CHECK(of_unlit.specular.empty());
-    const std::vector<View> views(3,
-                                  View{scene.camera, {scene.meshes[0].transform, scene.meshes[1].transform}});
-    const std::vector<Image> of_views(views.size(), weights);
-    Renderer one(open_device());
-    one.set_scene(scene);
-    one.set_views(views);
-    one.forward();
-    const SceneGradient three_times = one.backward(of_views);
-    const std::vector<double> single = flat(all.meshes[0].normals), sum = flat(three_times.meshes[0].normals);
-    for (std::size_t i = 0; i < sum.size(); ++i)
-      CHECK(sum[i] == doctest::Approx(3 * single[i]).epsilon(1e-4));
-    CHECK(three_times.meshes[0].shininess[0] ==
-          doctest::Approx(3 * all.meshes[0].shininess[0]).epsilon(1e-4));
-    for (const ViewGradient& view : three_times.views)
-      CHECK(view.transforms[0].rotation == three_times.views[0].transforms[0].rotation);
-    MultiDeviceRenderer several(dpr::test::several_devices(2));
-    several.set_scene(scene);
-    several.set_views(views);
-    const SceneGradient of_several = several.gradient(of_views);
-    const std::vector<double> parts = flat(of_several.meshes[0].normals);
-    for (std::size_t i = 0; i < sum.size(); ++i) CHECK(parts[i] == doctest::Approx(sum[i]).epsilon(1e-4));
+    for (const Shading shading : {Shading::phong, Shading::microfacet}) check_alone(shading);
   }
 
   /// A square of two triangles whose diagonal moves: what jumps at it is seen by noise of the pixel.

@@ -74,6 +74,52 @@ class ReflectionTest(unittest.TestCase):
         self.assertTrue(nothing.grad.isfinite().all())
 
 
+class MicrofacetTest(unittest.TestCase):
+    def test_renderers_lights_reflect_as_glTF_says(self):
+        """Image and gradients of a sphere in a point light of each of two views, by the renderer's lights and by shading of
+        one's own."""
+        y, turn = torch.meshgrid(torch.linspace(-0.98, 0.98, 14), torch.arange(24) / 24 * 2 * math.pi, indexing="ij")
+        ring = (1 - y * y).sqrt()
+        vertices = torch.stack((ring * turn.sin(), y, ring * turn.cos()), -1).reshape(-1, 3)
+        row, column = torch.meshgrid(torch.arange(13), torch.arange(24), indexing="ij")
+        a, b = (row * 24 + column).reshape(-1), (row * 24 + (column + 1) % 24).reshape(-1)
+        faces = torch.cat((torch.stack((a, b, b + 24), 1), torch.stack((a, b + 24, a + 24), 1)))
+        eyes = torch.tensor([[0.4, 0.8, 3.5], [-2.5, 1.0, 2.0]])
+        views = torch.cat([dpr.look_at(eye) for eye in eyes])
+        intrinsics = torch.from_numpy(dpr.perspective(40, 40, 32))
+        lamps = torch.tensor([[2.0, 2.5, 3.0], [-3.5, 1.0, -0.5]])
+        light = torch.tensor([0.9, 0.7, 0.5])  # irradiance over pi
+        renderer = dpr.Renderer(40, 32, shading="microfacet")
+        weights = random(2, 32, 40, 3, seed=3)
+
+        def by_lights(vertices, base, metallic, roughness):
+            material = {"specular": (0.04 + (base - 0.04) * metallic)[None], "shininess": 2 / roughness**4 - 1}
+            point = torch.cat((lamps, light.expand(2, 3), light.expand(2, 3)), 1)[:, None]
+            lights = {"ambient": torch.zeros(3), "point": point}
+            return renderer(vertices, faces, views, intrinsics, colors=(base * (1 - metallic)).expand(len(vertices), 3),
+                                   materials=material, lights=lights)[..., :3]
+
+        def by_formula(vertices, base, metallic, roughness):
+            samples = renderer.rasterize(vertices, faces, views, intrinsics)
+            position = samples.interpolate(vertices.expand(2, -1, -1))
+            normal = shading.unit(samples.interpolate(shading.vertex_normals(vertices, faces).expand(2, -1, -1)))
+            to_eye, to_lamp = (shading.unit(at[:, None, None] - position) for at in (eyes, lamps))
+            shares = shading.metallic_roughness(normal, to_eye, to_lamp, base, metallic, roughness)
+            return samples.resolve(math.pi * light * shares * samples.mask[..., None])
+
+        for values in ((0.0, 1.0), (0.7, 0.4), (1.0, 0.55)):
+            images, gradients = [], []
+            for draw in (by_lights, by_formula):
+                tensors = [vertices.clone(), torch.tensor([0.9, 0.5, 0.1]), *(torch.tensor([value]) for value in values)]
+                tensors = [tensor.requires_grad_() for tensor in tensors]
+                images.append(draw(*tensors))
+                gradients.append(torch.autograd.grad((images[-1] * weights).sum(), tensors))
+            self.assertGreater(images[1].detach().amax(), 0.2)
+            torch.testing.assert_close(images[0], images[1], atol=1e-4, rtol=0)
+            for found, expected in zip(*gradients):
+                self.assertLess((found - expected).norm(), 5e-4 * expected.norm(), (values, found.shape))
+
+
 class EnvironmentTest(unittest.TestCase):
     def image(self, height=64):
         """Smooth light, that differs in every direction."""

@@ -86,8 +86,9 @@ class TexturesTest(RenderTest):
         materials = {f"materials.{name}": tensor for name, tensor in textured()["materials"].items()}
         lights = {"lights.ambient": torch.tensor([[0.2, 0.3, 0.4], [0.5, 0.3, 0.1]])}
         self.check_gradients(SMOOTH, {**texels, **materials, **lights}, constants)
-        self.check_gradients({**SMOOTH, "shading": "blinn"}, {**texels, **materials, **lights},
-                             {**constants, "filter": "trilinear"})
+        for word in ("blinn", "microfacet"):
+            self.check_gradients({**SMOOTH, "shading": word}, {**texels, **materials, **lights},
+                                 {**constants, "filter": "trilinear"})
         smooth = {"textures.0": torch.stack((torch.linspace(0, 1, 9).repeat(9, 1),) * 3, 2), "wrap": "clamp"}
         inside = 0.2 + 0.5 * random(5, 2, seed=8)
         constants = {"vertices": SQUARE, "faces": SQUARE_FACES, "views": views, "intrinsics": intrinsics, **smooth}

@@ -287,7 +287,7 @@ TEST_SUITE("gradient") {
   }
 
   TEST_CASE("renderer: gradients with every lighting model, metric and interpolation") {
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud}) {
+    for (const Shading shading : k_shadings) {
       for (const DistanceMetric metric : {DistanceMetric::squared, DistanceMetric::euclidean}) {
         for (const bool perspective : {true, false}) {
           Scene scene = small_scene();

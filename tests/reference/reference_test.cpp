@@ -268,6 +268,7 @@ TEST_SUITE("gradient") {
     lights.spot = {{{0.3, 1.2, 1.8}, {0.2, -0.5, -1.7}, 50.0, 5.0, {0.4, 0.1, 0.2}, {0.3, 0.2, 0.1}}};
     for (int k = 0; k < 9; ++k) lights.harmonics.push_back(random.vector(-0.5, 0.5));
     lights.shininess = 4.0;
+    lights.reflectance = {0.3, 0.8, 0.05};
     const Vec3d camera = {0.4, 0.6, 3.0};
     const Vec3d weight = {0.3, 0.8, -0.4};
     const CornerColors corners = {random.vector(0.0, 1.0), random.vector(0.0, 1.0), random.vector(0.0, 1.0)};
@@ -280,7 +281,7 @@ TEST_SUITE("gradient") {
     append(at, camera);
     const std::vector<double> numbers = numbers_of(lights);
     at.insert(at.end(), numbers.begin(), numbers.end());
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_shadings) {
       CAPTURE(static_cast<int>(shading));
       const auto unpack = [&](const std::vector<double>& v) {
         Lights l = displaced(zero_like(lights), {v.begin() + 36, v.end()});
@@ -355,7 +356,7 @@ TEST_SUITE("gradient") {
   }
 
   TEST_CASE("shade: normals without a direction give no light and no NaN") {
-    for (const Shading shading : {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn}) {
+    for (const Shading shading : k_shadings) {
       Lights lights;
       lights.point.resize(1);
       lights.shading = shading;

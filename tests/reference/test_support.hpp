@@ -15,6 +15,8 @@
 namespace dpr::reference {
 
 inline constexpr std::array k_compositions = {Composition::barrier, Composition::joint};
+inline constexpr std::array k_shadings = {Shading::flat, Shading::phong, Shading::gouraud, Shading::blinn,
+                                          Shading::microfacet};
 
 /// Uniform numbers that are the same with every standard library.
 class Random {

@@ -100,6 +100,8 @@ TEST_SUITE("unit") {
     CHECK_FALSE(scene.gradients.lights);
     CHECK(read(folder, with(R"("lights": {"shading": "gouraud"})")).lights->shading == Shading::gouraud);
     CHECK(read(folder, with(R"("lights": {"shading": "blinn"})")).lights->shading == Shading::blinn);
+    CHECK(read(folder, with(R"("lights": {"shading": "microfacet"})")).lights->shading ==
+          Shading::microfacet);
     CHECK_FALSE(read(folder, with(R"("gradients": [])")).gradients.camera);
     CHECK(read(folder, with(R"("cull": "back")")).cull == Cull::back);
     CHECK(read(folder, with(R"("cull": "front")")).cull == Cull::front);
@@ -296,7 +298,7 @@ TEST_SUITE("robustness") {
     check(with(R"("lights": {"harmonics": [[1, 1, 1]]})"), "lights.harmonics (");
     check(with(R"("lights": {"directional": [{"direction": [0, 0, 0]}]})"),
           "lights.directional[0].direction (");
-    check(with(R"("lights": {"shading": "matt"})"), "flat, phong, gouraud or blinn");
+    check(with(R"("lights": {"shading": "matt"})"), "flat, phong, gouraud, blinn or microfacet");
     check(with(R"("smoothing": {"Sigma": 1})"), "smoothing (");
     check(with_mesh(R"("file": "a", "colour": 1)"), "meshes[0] (");
     check(R"({"camera": {"view": 1, "znear": 1, "view": 2}})", "camera.view (");
@@ -326,7 +328,7 @@ TEST_SUITE("robustness") {
     check(with(R"("smoothing": {"occupancy_width": "wide"})"),
           "got \"wide\", expected fixed, variable or zero");
     check(with(R"("smoothing": {"occupancy_width": "variable"})"), "smoothing.occupancy_width (");
-    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong, gouraud or blinn");
+    check(with(R"("lights": {"shading": "smooth"})"), "expected flat, phong, gouraud, blinn or microfacet");
     check(with(R"("camera": {"intrinsics": {"fx": 1, "fy": 1, "cx": 0}})"), "got no key \"cy\"");
     const std::string rows = R"([[1,0,0,0],[0,1,0,0],[0,0,1],[0,0,0,1]])";
     check(with_mesh(k_triangle + R"(, "transform": )" + rows), "meshes[0].transform[2] (");

@@ -33,7 +33,8 @@ class Renderer:
                     depths of its vertices, the near one at least 1/1024 of the far one. Triangles are clipped
                     at both planes, those that cross both at znear alone.
         cull        "none", "back" or "front"
-        shading, shininess  of lights: "phong", "blinn", "gouraud" or "flat"; 64 unless given
+        shading, shininess  of lights: "phong", "blinn", "gouraud", "flat" or "microfacet", which is glTF's reflection of
+                    colors (1 - metallic) and materials of specular F0 and shininess 2 / roughness**4 - 1; 64 unless given
 
     Settings may be changed later, as attributes: renderer.blur = 0.5. Unknown names are refused, and so is a
     setting that the smoothing does not use: sigma of the preset "rigid", alpha of the joint composition,
