@@ -20,7 +20,7 @@ inline constexpr std::uint32_t k_no_texture = std::numeric_limits<std::uint32_t>
 
 /// Highlights of a surface. Lights has their formula.
 struct Material {
-  vec3 specular{1.0F};             ///< the lights' specular is multiplied by it
+  vec3 specular{1.0F};             ///< the lights' specular is multiplied by it; microfacet: F0
   std::optional<float> shininess;  ///< >= 1; none: that of the lights
 
   bool operator==(const Material&) const = default;
@@ -29,6 +29,17 @@ struct Material {
 /// Throws InvalidArgument for a coefficient that is not finite, and a shininess below 1. `name` says in the
 /// message which material it is.
 DPR_API void validate(const Material& material, const std::string& name = "material");
+
+/// A surface's colour beside its material.
+struct ColoredMaterial {
+  vec3 color;
+  Material material;
+};
+
+/// glTF's metal and roughness, from 0 to 1, for Shading::microfacet: the colour base_color (1 - metallic), the
+/// reflectance 0.04 + (base_color - 0.04) metallic, and the shininess 2 / alpha^2 - 1 of alpha = roughness^2, at least
+/// 0.001. Throws InvalidArgument for numbers beyond 0 to 1, and a colour (linear RGB) that is not finite.
+DPR_API ColoredMaterial metallic_roughness(const vec3& base_color, float metallic, float roughness);
 
 /// An indexed triangle mesh in object space. Any soup will do: shared or unshared vertices, non-manifold
 /// edges, duplicate or degenerate faces. At most one of the two colour arrays is filled; with neither, the

@@ -1,6 +1,7 @@
-// Validity of a mesh.
+// Validity of a mesh, and materials of glTF's metal and roughness.
 #include "dpr/mesh.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/checks.hpp"
@@ -130,6 +131,21 @@ void validate(const Material& material, const std::string& name) {
   const float shininess = material.shininess.value_or(1);
   if (!(shininess >= 1 && std::isfinite(shininess)))
     throw InvalidArgument("shininess of " + name, checks::text(shininess), "a finite number >= 1");
+}
+
+ColoredMaterial metallic_roughness(const vec3& base_color, float metallic, float roughness) {
+  constexpr float k_dielectric = 0.04F, k_least_alpha = 1e-3F;  // of glTF; of the kernels
+  checks::require_finite(base_color, "base_color");
+  const auto require_share = [](float value, const char* argument) {
+    if (!(value >= 0 && value <= 1))
+      throw InvalidArgument(argument, checks::text(value), "a number from 0 to 1");
+  };
+  require_share(metallic, "metallic");
+  require_share(roughness, "roughness");
+  const float alpha = std::max(roughness * roughness, k_least_alpha);
+  const vec3 dielectric(k_dielectric);
+  return {(1 - metallic) * base_color,
+          {dielectric + metallic * (base_color - dielectric), 2 / (alpha * alpha) - 1}};
 }
 
 void validate(const Mesh& mesh, const std::string& name) {

@@ -167,6 +167,25 @@ TEST_SUITE("robustness") {
     lights.shading = static_cast<Shading>(7);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, validate(lights), "flat, phong, gouraud, blinn or microfacet");
   }
+
+  TEST_CASE("metal and roughness: glTF's reflectances, and every roughness has a valid exponent") {
+    const glm::vec3 base(0.9F, 0.5F, 0.1F);
+    const ColoredMaterial matt = metallic_roughness(base, 0, 1), metal = metallic_roughness(base, 1, 0.5F),
+                          mirror = metallic_roughness(base, 0.5F, 0);
+    CHECK(matt.color == base);
+    CHECK(matt.material == Material{glm::vec3(0.04F), 1.0F});
+    CHECK(metal.color == glm::vec3(0));
+    CHECK(glm::distance(metal.material.specular, base) < 1e-6F);
+    CHECK(*metal.material.shininess == doctest::Approx(31));  // alpha^2 = 1 / 16
+    CHECK(mirror.color == 0.5F * base);
+    CHECK(glm::distance(mirror.material.specular, glm::vec3(0.47F, 0.27F, 0.07F)) < 1e-6F);
+    CHECK(*mirror.material.shininess == doctest::Approx(2e6 - 1));
+    for (int step = 0; step <= 1000; ++step)
+      CHECK_NOTHROW(validate(metallic_roughness(base, 0, static_cast<float>(step) / 1000).material));
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, metallic_roughness(base, -0.1F, 0), "metallic: got -0.1");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, metallic_roughness(base, 0, k_nan), "roughness: got nan");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, metallic_roughness(glm::vec3(k_nan), 0, 0), "base_color");
+  }
 }
 
 }  // namespace mesh_test
