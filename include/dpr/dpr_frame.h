@@ -32,10 +32,11 @@
  *                                             specular
  *   sigma, gamma, alpha  [] or [1]            instead of the settings'
  *
- * Textures may have a leading dimension of 1. So may lights, or one of N: then they are each view's own, as many of a kind
- * as in the others. With faces [N, F, 3] each view shows a mesh of its own, at the launches of one. Of fewer faces than
- * others the last are (0, 0, 0), of fewer vertices the last lie where another does. Then vertices are [N, V, 3], colours [N, V, 3] or [N, F, 3], opacities [N, V] or [N, F], texture coordinates [T, 2]
- * with face_texcoords; those, face_textures and face_materials have N in front, and refer to lists of all meshes.
+ * Textures may have a leading dimension of 1. So may lights, or one of N: then they are each view's own, as many of
+ * a kind as in the others. With faces [N, F, 3] each view shows a mesh of its own, at the launches of one. Of fewer
+ * faces than others the last are (0, 0, 0), of fewer vertices the last lie where another does. Then vertices are
+ * [N, V, 3], colours [N, V, 3] or [N, F, 3], opacities [N, V] or [N, F], texture coordinates [T, 2] with
+ * face_texcoords; those, face_textures and face_materials have N in front, and refer to lists of all meshes.
  *
  * Outputs, and their gradients:
  *
@@ -115,8 +116,8 @@ DPR_API dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, 
  * arrays of which `gradients` of the options names as well, and are float32 [directions, ...], a row how fast
  * each number of the array changes; other arrays stay. Fills pixels, RGBA [direction][view][height][width][4],
  * `pixel_count` floats. The transpose of dpr_frame_backward(), views included. Directions share most of the
- * work: one costs up to two frames, six up to four. Waits for the device. Images have tangents along
- * vertices, colors, face_colors, views, intrinsics, background, sigma, gamma and alpha, other outputs none:
+ * work: one costs up to two frames, six up to five. Waits for the device. Images have tangents along vertices, colors,
+ * face_colors, opacities, face_opacities, views, intrinsics, background, sigma, gamma and alpha, other outputs none:
  * textures, texcoords, materials and lights are refused, and so are Monte Carlo and, with noise on the pixel
  * (preset "pixel"), a sigma that changes. */
 DPR_API dpr_status dpr_frame_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
@@ -181,15 +182,16 @@ DPR_API dpr_status dpr_cut_size(const dpr_cut* cut, size_t* faces, size_t* verti
 DPR_API dpr_status dpr_cut_read(const dpr_cut* cut, const dpr_array* arrays, size_t count);
 DPR_API void dpr_cut_destroy(dpr_cut* cut);
 
-/* Positions in OpenGL's clip space as vertices in front of a camera, for frames: dpr/clip_space.hpp. Of the arrays positions
- * [V, 4] or [N, V, 4], and faces [F, 3], of whose vertices nothing else matters, or all without. */
+/* Positions in OpenGL's clip space as vertices in front of a camera, for frames with noise on the pixel and without
+ * lights: dpr/clip_space.hpp. Of the arrays positions [V, 4] or [N, V, 4], and faces [F, 3]: other vertices than
+ * theirs may lie anywhere; without faces all count. */
 typedef struct dpr_clip_space dpr_clip_space;
 DPR_API dpr_status dpr_clip_space_create(int width, int height, const dpr_array* arrays, size_t count,
                                          dpr_clip_space** clip_space);
 /* How many shapes there are, and numbers in a row of intrinsics: 4 of a pinhole, 1 of an orthographic camera. */
 DPR_API dpr_status dpr_clip_space_size(const dpr_clip_space* clip_space, size_t* shapes, size_t* intrinsics);
-/* Fills the float32 arrays that are named: vertices [N, V, 3], views [N, 4, 4] and intrinsics [N, ...], which frames take,
- * planes [2], their settings znear and zfar, and scales [N]. */
+/* Fills the float32 arrays that are named: vertices [N, V, 3], views [N, 4, 4] and intrinsics [N, ...], which frames
+ * take, planes [2], their settings znear and zfar, and scales [N]. */
 DPR_API dpr_status dpr_clip_space_read(const dpr_clip_space* clip_space, const dpr_array* arrays, size_t count);
 /* From the gradients of vertices, [N, V, 3], to those of positions, [N, V, 4]. */
 DPR_API dpr_status dpr_clip_space_backward(const dpr_clip_space* clip_space, const dpr_array* grad_vertices,
@@ -222,8 +224,8 @@ DPR_API void dpr_mesh_file_destroy(dpr_mesh_file* file);
 DPR_API dpr_status dpr_mesh_file_write(const char* path, const dpr_array* arrays, size_t count,
                                        const char* const* settings, size_t setting_count);
 
-/* An image of a file: dpr/image.hpp has the formats and their errors. `encoding` of files of 8 or 16 bits: "srgb" (NULL),
- * which becomes linear, or "linear", which is taken as it is. */
+/* An image of a file: dpr/image.hpp has the formats and their errors. `encoding` of files of 8 or 16 bits: "srgb"
+ * (NULL), which becomes linear, or "linear", which is taken as it is. */
 typedef struct dpr_image_file dpr_image_file;
 DPR_API dpr_status dpr_image_file_read(const char* path, const char* encoding, dpr_image_file** file);
 /* DPR_FLOAT32 [height, width, 4], linear RGB and alpha, row 0 on top. Valid until the file is destroyed, and not to be

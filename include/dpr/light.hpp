@@ -54,7 +54,8 @@ inline constexpr std::size_t k_harmonics = 9;
 /// specular: 1 without materials, a white metal, on which lights have no diffuse part. D and V have alpha^2 = 2 /
 /// (shininess + 1), at least 1e-6; the least shininess, 1, is glTF's roughness 1. A light's diffuse and specular are
 /// its irradiance over pi. metallic_roughness() (dpr/mesh.hpp) makes colours and materials. A surface seen from behind
-/// reflects as one seen edge-on, and such reflection begins steeply at n.l = 0.
+/// reflects as one seen edge-on, and such reflection begins steeply at n.l = 0. What is all around, ambient and
+/// environment, reaches the base alone: a smooth metal, whose base is dark, shows its lights and little else.
 ///
 /// The environment is distant light of radiance sum L_lm Y_lm(w) from the direction w, and what a white
 /// diffuse surface reflects of it (Ramamoorthi and Hanrahan 2001): sum a_l L_lm Y_lm(n), a = 1, 2/3, 1/4,

@@ -116,6 +116,9 @@ dpr_status dpr_clip_space_backward(const dpr_clip_space* clip_space, const dpr_a
     const dpr_clip_space& clip = deref(clip_space, "clip_space");
     const NamedArray from = dpr::batch::to_arrays(grad_vertices, 1, "grad_vertices")[0],
                      to = dpr::batch::to_arrays(grad_positions, 1, "grad_positions")[0];
+    if (from.name != "vertices" || to.name != "positions")
+      throw dpr::InvalidArgument("name (clip space)", "\"" + from.name + "\" and \"" + to.name + "\"",
+                                 "the gradient of vertices, and that of positions");
     dpr::batch::require_floats(from, {clip.shapes(), clip.vertices(), 3}, "[N, V, 3]");
     dpr::batch::require_floats(to, {clip.shapes(), clip.vertices(), 4}, "[N, V, 4]");
     std::ranges::copy(clip.space.gradient(clip.positions, from.rows<const glm::vec3>()),

@@ -987,7 +987,9 @@ static void test_clip_space(void) {
     if (side == 0) {
       OK(dpr_frame_backward(frame, &grad, 1, &gradient, 1));
       OK(dpr_clip_space_backward(clip, &gradient, &of_positions));
-      of_positions.shape[1] = 2;
+      of_positions.name = "position";
+      REFUSED(dpr_clip_space_backward(clip, &gradient, &of_positions), "positions");
+      of_positions.name = "positions", of_positions.shape[1] = 2;
       REFUSED(dpr_clip_space_backward(clip, &gradient, &of_positions), "positions");
       REFUSED(dpr_clip_space_read(clip, given, 1), "vertices, views, intrinsics, planes or scales");
     } else {

@@ -206,6 +206,14 @@ class ListsTest(unittest.TestCase):
             for name in outputs[1:]:
                 self.assert_close(found[name], expected[name], 1e-5, name)
 
+    def test_opaque_surfaces_have_outputs_with_gradients(self):
+        for name in ("opacities", "face_opacities"):
+            ones = [np.ones(len(array), np.float32) for array in (VERTICES if name == "opacities" else FACES)]
+            (_, found, _, frames), (_, expected, _, _) = (rendered({name: ones}, "pixel", merged, ["depth"])
+                                                          for merged in (True, False))
+            self.assertEqual(frames, 1)
+            self.assert_close(found["depth"], expected["depth"], 1e-5, name)
+
     def test_outputs_with_gradients(self):
         outputs = ["depth", "position", "normal", "texcoords", "uv"]
         for noise in NOISES:
@@ -266,6 +274,7 @@ class ListsTest(unittest.TestCase):
         cases = {"faces": ("faces", np.where(FACES[small] == 0, len(VERTICES[small]), FACES[small])),
                  "colors": ("colors", random(len(VERTICES[small]) + 1, 3)), "few colors": ("colors", random(3, 3)),
                  "opacities": ("opacities", random(len(VERTICES[small]) + 1)),
+                 "column of opacities": ("opacities", random(len(VERTICES[small]), 1)),
                  "texcoords": ("texcoords", random(len(VERTICES[small]) - 1, 2)),
                  "face_textures": ("face_textures", np.ones(len(FACES[small]), np.int64)),
                  "face_materials": ("face_materials", np.full(len(FACES[small]), 2)),

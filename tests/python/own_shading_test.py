@@ -242,6 +242,7 @@ class OwnShadingTest(unittest.TestCase):
         samples = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
         colors = [random(4, 3), random(5, 3)]
         for given, words in (([colors[:1]], "attributes .*1 meshes, expected a list of 2"),
+                             ([colors[1]], r"attributes .*\[5, 3\], expected a list of 2"),
                              ([colors[::-1]], r"attributes\[0\] .*\[5, 3\], expected \[V, C\], V: 4"),
                              ([[colors[0], colors[1][:, :2]]], r"attributes\[1\] .*\[5, 2\], expected \[V, 3\]"),
                              ([colors, FACES], "faces .*ndarray, expected a list of 2"),

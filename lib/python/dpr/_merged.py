@@ -35,9 +35,9 @@ def is_regular(mesh):
     vertices, faces = mesh["vertices"].size // 3, mesh["faces"].size // 3
     texcoords, textures, materials = mesh.get("texcoords"), _texture_count(mesh), _material_count(mesh)
     by_index = "face_texcoords" in mesh
-    sizes = {"colors": 3 * vertices, "face_colors": 3 * faces, "opacities": vertices, "face_opacities": faces,
-             "face_texcoords": 3 * faces, "face_textures": faces, "face_materials": faces,
-             "materials.specular": 3 * materials, "materials.shininess": materials}
+    shapes = {"colors": (vertices, 3), "face_colors": (faces, 3), "opacities": (vertices,), "face_opacities": (faces,),
+              "face_texcoords": (faces, 3), "face_textures": (faces,), "face_materials": (faces,),
+              "materials.specular": (materials, 3), "materials.shininess": (materials,)}
     bounds = {"faces": vertices, "face_texcoords": 0 if texcoords is None else texcoords.size // 2,
               "face_textures": textures, "face_materials": materials}
     least = {"face_textures": -1}
@@ -45,7 +45,7 @@ def is_regular(mesh):
             and (texcoords is not None) == (textures > 0)
             and (texcoords is None or texcoords.shape in (((vertices, 2), (faces, 3, 2)) if not by_index else
                                                           ((texcoords.size // 2, 2),)))
-            and all(mesh[name].size == size for name, size in sizes.items() if name in mesh)
+            and all(mesh[name].shape == shape for name, shape in shapes.items() if name in mesh)
             and all(mesh[name].max() < bound and mesh[name].min() >= least.get(name, 0)
                     for name, bound in bounds.items() if name in mesh))
 
@@ -156,6 +156,8 @@ class Merged:
             self._next["materials"] += _material_count(mesh)
         self.named = [(name, np.stack([of_view[name] for of_view in indices])) for name in indices[0]]
         merged = self._room()
+        for name in merged.keys() & {"opacities", "face_opacities"}:
+            merged[name][...] = 1  # of what is padded too: outputs with gradients need opaque surfaces
         for part, name, place in self._places:
             own = part.of(arrays[part.leaf])
             merged[name][place] = own.reshape(merged[name][place].shape)

@@ -116,15 +116,15 @@ class Renderer:
         face_colors  [F, 3] or [N, F, 3], of the faces; white without either
         opacities    [V], from 0 to 1, of the vertices; or face_opacities [F], of the faces; opaque without. Below 1 outputs
                      with gradients are refused. The barrier composition (the preset "softras" say) hardly heeds them
-        texcoords    (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
+        texcoords    of textures: (u, v), v up, of the vertices [V, 2], of the faces' corners [F, 3, 2], or [T, 2] with
         face_texcoords  [F, 3], int64 or int32: their indices
         textures     [H, W, 3], linear RGB, row 0 on top, or a list of such of any sizes; [N, H, W, 3]: of each view by
                      itself. Colours multiply them. Of [H, W, 4] the fourth channel is opacity, which opacities multiply
         face_textures   [F], int64 or int32: the faces' textures, -1 for none; all have the first unless given
         wrap         "repeat", "mirror" or "clamp", what lies beyond [0, 1]; a word, or a list of one a texture
         filter       "nearest", "bilinear" or "trilinear", which has a pyramid of smaller images; likewise
-        materials    a dictionary: "specular" [M, 3] (1 if left out) multiplies highlights, "shininess" [M] (or the lights')
-        face_materials  [F], int64 or int32: the faces' materials; all have the first unless given
+        materials    a dictionary: "specular" [M, 3] multiplies highlights, "shininess" [M]. Without, 1 (by microfacets a
+                     white metal, without colours) and the lights'. face_materials [F]: the faces', all the first without
         background   [3], linear RGB; black unless given. A picture: image[..., :3] + (1 - image[..., 3:]) * picture
         lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
                      [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"

@@ -235,8 +235,10 @@ class Samples:
         if isinstance(attributes, (list, tuple)) and self._is_of_list:
             attributes, faces = self._tables(attributes, faces)
         else:
-            most = max(vertices for vertices, _ in self._meshes)
-            attributes, faces = self._table("", attributes, faces, most, tuple(self._faces.shape))
+            counts = {vertices for vertices, _ in self._meshes}
+            if len(counts) > 1 and faces is None and len(getattr(attributes, "shape", ())) == 2:
+                _arrays.fail(ValueError, "attributes", list(attributes.shape), f"a list of {len(self._meshes)}", "dpr.Samples")
+            attributes, faces = self._table("", attributes, faces, max(counts), tuple(self._faces.shape))
         faces = self._faces if faces is None else faces
         if 0 in (*faces.shape, attributes.shape[-2]):
             return self.barycentrics[..., :1] * attributes.sum(-2)[..., None, None, :]  # 0: there is nothing
