@@ -211,8 +211,8 @@ class Merged:
 
     def _room(self, leaves=None):
         """{name: zeros} of arrays with numbers of these leaves, or of all."""
-        return {name: np.zeros(shape, np.float32) for name, shape in self._shapes.items()
-                if leaves is None or any(name == own and part.leaf in leaves for part, own, _ in self._places)}
+        wanted = self._shapes if leaves is None else {name for part, name, _ in self._places if part.leaf in leaves}
+        return {name: np.zeros(shape, np.float32) for name, shape in self._shapes.items() if name in wanted}
 
     def names(self, wanted):
         return list(self._room(wanted))
