@@ -40,49 +40,40 @@ dpr_clip_space make(int width, int height, dpr::batch::NamedArrays arrays) {
   return {dpr::ClipSpace(rows, shapes, faces, width, height), {rows.begin(), rows.end()}};
 }
 
-/// The numbers of a named array, for every shape.
-std::vector<float> numbers_of(const dpr_clip_space& clip, const std::string& name) {
+/// Fills an array by its name.
+void read(const dpr_clip_space& clip, const NamedArray& array) {
   const dpr::Camera& camera = clip.space.camera();
+  const std::size_t shapes = clip.shapes();
   std::vector<float> numbers;
   const auto add = [&](std::initializer_list<float> more) { numbers.insert(numbers.end(), more); };
-  if (name == "vertices") {
+  if (array.name == "vertices") {
+    dpr::batch::require_floats(array, {shapes, clip.vertices(), 3}, "[N, V, 3]");
     for (const glm::vec3& v : clip.space.vertices(clip.positions)) add({v.x, v.y, v.z});
-  } else if (name == "planes") {
-    add({camera.znear, camera.zfar});
-  } else if (name == "scales") {
-    numbers.assign(clip.space.scales().begin(), clip.space.scales().end());
-  } else {
-    for (std::size_t shape = 0; shape < clip.shapes(); ++shape) {
-      if (name == "views") {
-        add({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
-      } else if (const auto& lens = camera.intrinsics) {
+  } else if (array.name == "views") {
+    dpr::batch::require_floats(array, {shapes, 4, 4}, "[N, 4, 4]");
+    for (std::size_t shape = 0; shape < shapes; ++shape)
+      add({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+  } else if (array.name == "intrinsics") {
+    dpr::batch::require_floats(array, {shapes, clip.intrinsics()},
+                               "[N, " + std::to_string(clip.intrinsics()) + "]");
+    for (std::size_t shape = 0; shape < shapes; ++shape) {
+      if (const auto& lens = camera.intrinsics) {
         add({lens->fx, lens->fy, lens->cx, lens->cy});
       } else {
         add({*camera.orthographic_height});
       }
     }
-  }
-  return numbers;
-}
-
-void read(const dpr_clip_space& clip, const NamedArray& array) {
-  const std::size_t shapes = clip.shapes();
-  if (array.name == "vertices") {
-    dpr::batch::require_floats(array, {shapes, clip.vertices(), 3}, "[N, V, 3]");
-  } else if (array.name == "views") {
-    dpr::batch::require_floats(array, {shapes, 4, 4}, "[N, 4, 4]");
-  } else if (array.name == "intrinsics") {
-    dpr::batch::require_floats(array, {shapes, clip.intrinsics()},
-                               "[N, " + std::to_string(clip.intrinsics()) + "]");
   } else if (array.name == "scales") {
     dpr::batch::require_floats(array, {shapes}, "[N]");
+    numbers.assign(clip.space.scales().begin(), clip.space.scales().end());
   } else if (array.name == "planes") {
     dpr::batch::require_floats(array, {2}, "[2]");
+    add({camera.znear, camera.zfar});
   } else {
     throw dpr::InvalidArgument("name (clip space)", "\"" + array.name + "\"",
                                "vertices, views, intrinsics, planes or scales");
   }
-  std::ranges::copy(numbers_of(clip, array.name), array.rows<float>().begin());
+  std::ranges::copy(numbers, array.rows<float>().begin());
 }
 
 }  // namespace
