@@ -100,8 +100,7 @@ typedef struct dpr_camera {
   /* OpenCV's k1, k2, p1, p2, k3 of the lens; NULL: it does not distort. Read during the call. Vertices are
    * moved and edges stay straight, so faces should be small. */
   const float* distortion;
-  /* Not 0: orthographic, with so many world units from the lower to the upper edge; fx is 0 then, and
-   * distortion and fisheye NULL. */
+  /* Not 0: orthographic, so many world units from lower to upper edge; fx is 0 then, distortion and fisheye NULL. */
   float orthographic_height;
   const float* fisheye; /* k1, k2, k3, k4 of a lens of cv::fisheye, instead of distortion; NULL: none */
 } dpr_camera;
