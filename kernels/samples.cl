@@ -1,5 +1,6 @@
 // What the samples of a rigid image show, for shading outside of the library, and the gradients that come back.
 #include "nearest.h"
+#include "texture.h"
 
 static inline size_t samples_of_frame(const FrameParams p) { return (size_t)p.views * p.width * p.height; }
 
@@ -33,6 +34,30 @@ kernel void samples_forward(const FrameParams p, const uint last_pixel, const ui
     places[layer * samples_of_frame(p) + pixel] = place;
     face[layer * samples_of_frame(p) + pixel] = seen;
   }
+}
+
+/// How fast barycentrics change from sample to sample. One work-item per sample. Deterministic.
+/// in   count   [layer][pixel]
+/// in   places  float4[layer][pixel],  face  uint[layer][pixel]  as samples_forward leaves them
+/// in   triangles, clipped  [view][face]
+/// out  steps   float4[layer][pixel]  of corner 1 to the right and down, then of corner 2; 0 where nothing is
+kernel void samples_steps(const FrameParams p, const uint count, global const float4* restrict places,
+                          global const uint* restrict face, global const Triangle* restrict triangles,
+                          global const ClippedFace* restrict clipped, global float4* restrict steps) {
+  const size_t sample = get_global_id(0);
+  if (sample >= count) return;
+  if (face[sample] == DPR_NO_FACE) {
+    steps[sample] = 0.0f;
+    return;
+  }
+  const size_t view = (sample % samples_of_frame(p)) / (p.width * p.height), of_view = view * p.faces + face[sample];
+  const Steps s = p.clips && clipped[of_view].corners != 0 ? clipped_steps(clipped[of_view])
+                                                            : triangle_steps(p, triangles[of_view]);
+  const float c1 = places[sample].x, c2 = places[sample].y;
+  const float scale = p.pixel_size * ((1.0f - c1 - c2) * s.depth.x + c1 * s.depth.y + c2 * s.depth.z);
+  const float all_x = s.q_x.x + s.q_x.y + s.q_x.z, all_y = s.q_y.x + s.q_y.y + s.q_y.z;
+  steps[sample] = scale * (float4)(s.q_x.y - c1 * all_x, c1 * all_y - s.q_y.y, s.q_x.z - c2 * all_x,
+                                   c2 * all_y - s.q_y.z);
 }
 
 /// One work-item per sample, up to `last_pixel`; every fragment belongs to one. Deterministic. Inputs as

@@ -174,6 +174,9 @@ struct Samples {
   std::vector<vec2> barycentrics;
   /// [layer][view][height][width] along the view direction, world units; 0 without a face
   std::vector<float> depths;
+  /// [layer][view][height][width], where they were asked for: how fast the barycentrics change from sample to sample,
+  /// of corner 1 to the right and down, then of corner 2; 0 without a face. Footprints of textures follow from these.
+  std::vector<vec4> steps{};
 };
 
 class ImageLoss;
@@ -276,8 +279,9 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   void set_layers(int count);
   /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or
   /// textures, which have no part in it. The nearest surfaces alone count, whatever gamma is. Blocks. Throws as image()
-  /// does, and InvalidArgument without noise on the pixel, and with opacities below 1.
-  Samples samples();
+  /// does, and InvalidArgument without noise on the pixel, and with opacities below 1. dpr/interpolate.hpp and
+  /// dpr/texture_map.hpp make colours of them.
+  Samples samples(bool with_steps = false);
   /// Gradients of <grad_barycentrics, barycentrics> + <grad_depths, depths> by positions, transforms and cameras, as
   /// far as Scene::gradients asks for these. At contours, where samples jump from face to face, resolve_backward() has
   /// the rest.

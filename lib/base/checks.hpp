@@ -51,6 +51,14 @@ inline std::size_t first_not_finite(std::span<const float> numbers) {
   return numbers.size();
 }
 
+/// Throws unless there are as many, all of them finite.
+inline void require_numbers(std::span<const float> numbers, std::size_t count, const std::string& name) {
+  if (numbers.size() != count)
+    throw InvalidArgument(name, std::to_string(numbers.size()) + " numbers", std::to_string(count));
+  const std::size_t bad = first_not_finite(numbers);
+  if (bad != count) throw InvalidArgument(name, text(numbers[bad]), "finite numbers");
+}
+
 /// The numbers of vectors of floats.
 template <class Vector>
 std::span<const float> floats_of(std::span<const Vector> vectors) {

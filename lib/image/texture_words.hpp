@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "base/name_list.hpp"
@@ -28,6 +29,8 @@ inline std::string_view to_string(Wrap wrap) { return k_wrap_names.at(static_cas
 inline std::string_view to_string(Filter filter) {
   return k_filter_names.at(static_cast<std::size_t>(filter));
 }
+/// Throws InvalidArgument unless a texture may have this size and these ways; `name` says which texture it is.
+void require_form(int width, int height, Wrap wrap, Filter filter, const std::string& name);
 inline float period_of(Wrap wrap) { return k_wraps.at(static_cast<std::size_t>(wrap)).period; }
 
 }  // namespace dpr

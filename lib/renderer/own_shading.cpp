@@ -1,6 +1,5 @@
 // Noise on the pixel around shading of the caller's own: what the samples show, and images of their colours.
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "base/checks.hpp"
@@ -29,13 +28,6 @@ class GeometricRequest {
   GradientRequest& of_;
   GradientRequest whole_;
 };
-
-void require_numbers(std::span<const float> numbers, std::size_t count, const std::string& name) {
-  if (numbers.size() != count)
-    throw InvalidArgument(name, std::to_string(numbers.size()) + " numbers", std::to_string(count));
-  const auto bad = std::ranges::find_if_not(numbers, [](float v) { return std::isfinite(v); });
-  if (bad != numbers.end()) throw InvalidArgument(name, checks::text(*bad), "finite numbers");
-}
 
 /// Four channels of packed vectors, or those that are left, from `first` on.
 FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_t channels) {
@@ -220,7 +212,7 @@ void Renderer::set_layers(int count) {
   impl_->set_layers(static_cast<cl_uint>(count));
 }
 
-Samples Renderer::samples() {
+Samples Renderer::samples(bool with_steps) {
   Impl& m = *impl_;
   m.require_samples("Renderer::samples");
   m.find_samples();
@@ -238,6 +230,11 @@ Samples Renderer::samples() {
     found.barycentrics.emplace_back(place.s[0], place.s[1]);
     found.depths.push_back(place.s[2]);
   }
+  if (with_steps) {
+    m.surface_samples->find_steps(m.frame, m.setup.triangles, m.clip.faces);
+    for (const cl_float4& step : m.surface_samples->steps.download())
+      found.steps.emplace_back(step.s[0], step.s[1], step.s[2], step.s[3]);
+  }
   return found;
 }
 
@@ -246,8 +243,8 @@ SceneGradient Renderer::samples_backward(std::span<const glm::vec2> grad_barycen
   Impl& m = *impl_;
   m.require_samples("Renderer::samples_backward");
   const std::size_t count = m.layers * m.views.size() * m.frame.width * m.frame.height;
-  require_numbers(checks::floats_of(grad_barycentrics), 2 * count, "grad_barycentrics");
-  require_numbers(grad_depths, count, "grad_depths");
+  checks::require_numbers(checks::floats_of(grad_barycentrics), 2 * count, "grad_barycentrics");
+  checks::require_numbers(grad_depths, count, "grad_depths");
   std::vector<cl_float4> places(count);
   for (std::size_t i = 0; i < count; ++i)
     places[i] = {{grad_barycentrics[i].x, grad_barycentrics[i].y, grad_depths[i], 0}};
@@ -258,7 +255,7 @@ std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
   std::vector<float> pixels(channels * m.image().size());
   m.resolve(samples, channels, pixels);
   return pixels;
@@ -269,8 +266,8 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_backward");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
-  require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
   return m.resolve_backward(samples, channels, grad_pixels);
 }
 
@@ -287,8 +284,8 @@ std::vector<float> Renderer::resolve_tangent(std::span<const float> samples, std
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_tangent");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
-  require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
   m.require_tangents(directions);
   if (directions.empty()) return {};
   std::vector<float> pixels(directions.size() * channels * m.image().size());

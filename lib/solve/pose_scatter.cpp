@@ -16,7 +16,7 @@ constexpr double k_model = 7.5, k_robust_model = 75;
 constexpr double k_cluttered = 0.15;
 // Of the noise's scatter, as errors of poses in pictures with independent noise are (pose_uncertainty_test.cpp).
 constexpr double k_rough = 2;
-constexpr double k_normal =
+constexpr double k_deviation_of_median =
     1.4826;  // a normal distribution's standard deviation over the median of the sizes
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -82,7 +82,7 @@ PoseSpace::Matrix score_scatter(const ScoreCells& cells, std::size_t parameters,
     if (of_blocks > most) most = of_blocks, widest = scatter;
   }
 
-  const double noise = std::pow(k_normal * static_cast<double>(cells.median), 2);
+  const double noise = std::pow(k_deviation_of_median * static_cast<double>(cells.median), 2);
   double model = k_model * std::max(0.0, 1 - noise * cells.weight * static_cast<double>(n) / size);
   if (scale > 0) {
     const double of_noise = std::pow(1 + 3 * noise / std::pow(static_cast<double>(scale), 2), -2);

@@ -21,6 +21,18 @@ void SampledSurface::forward(const shared::FrameParams& p, const Bin& bin, const
   }
 }
 
+void SampledSurface::find_steps(const shared::FrameParams& p, const Buffer<shared::Triangle>& triangles,
+                                const Buffer<shared::ClippedFace>& clipped) {
+  steps.resize(device_, places.size());
+  launch_(places.size(), kernel::samples_steps{.p = p,
+                                               .count = static_cast<cl_uint>(places.size()),
+                                               .places = places,
+                                               .face = faces,
+                                               .triangles = triangles,
+                                               .clipped = clipped,
+                                               .steps = steps});
+}
+
 void SampledSurface::backward(const shared::FrameParams& p, const Buffer<cl_float4>& grad_places,
                               cl_uint layers, Rasterize& rasterize) {
   rasterize.start_gradients(p);

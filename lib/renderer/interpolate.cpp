@@ -1,0 +1,177 @@
+// Numbers of vertices at samples, and what comes back.
+#include "dpr/interpolate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "base/checks.hpp"
+
+namespace dpr {
+namespace {
+
+/// Attributes that fit samples, by the first number of a corner's channels.
+class Table {
+ public:
+  Table(const Samples& samples, const Attributes& attributes)
+      : samples_(samples), attributes_(attributes),
+        of_view_(static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height)),
+        views_(samples.faces.size() / std::max<std::size_t>(of_view_ * static_cast<std::size_t>(samples.layers), 1)) {
+    if (views_ == 0 || samples.barycentrics.size() != samples.faces.size())
+      throw InvalidArgument("samples (interpolate)", std::to_string(samples.faces.size()),
+                            "what Renderer::samples() returns");
+    if (attributes.channels == 0) throw InvalidArgument("channels (interpolate)", "0", "at least 1");
+    faces_ = attributes.faces_are_of_views ? rows_of_views(attributes.faces.size(), 1, "faces") : 0;
+    row_stride_ =
+        attributes.are_of_views ? rows_of_views(attributes.values.size(), attributes.channels, "values") : 0;
+    const std::size_t faces = faces_ != 0 ? faces_ : attributes.faces.size();
+    const std::size_t rows = row_stride_ != 0 ? row_stride_ : attributes.values.size() / attributes.channels;
+    checks::require_numbers(attributes.values, (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
+                    "values (interpolate)");
+    for (const std::int32_t face : samples.faces)
+      if (face >= 0 && static_cast<std::size_t>(face) >= faces)
+        throw InvalidArgument("faces (interpolate)", std::to_string(faces),
+                              "those of the samples, of which one shows face " + std::to_string(face));
+    for (std::size_t i = 0; i < attributes.faces.size(); ++i) {
+      const uvec3& face = attributes.faces[i];
+      const std::uint32_t largest = std::max({face.x, face.y, face.z});
+      if (largest >= rows)
+        throw InvalidArgument(checks::in(checks::element("faces", i), "interpolate"), std::to_string(largest),
+                              "indices below " + std::to_string(rows) + ", the rows of values");
+    }
+  }
+
+  std::size_t channels() const { return attributes_.channels; }
+  std::size_t count() const { return samples_.faces.size(); }
+  bool is_empty(std::size_t sample) const { return samples_.faces[sample] < 0; }
+
+  /// The first of the numbers of a sample's corners.
+  std::array<std::size_t, 3> corners(std::size_t sample) const {
+    const std::size_t view = sample / of_view_ % views_;
+    const uvec3& face = attributes_.faces[view * faces_ + static_cast<std::size_t>(samples_.faces[sample])];
+    const std::size_t first = view * row_stride_;
+    return {(first + face.x) * channels(), (first + face.y) * channels(), (first + face.z) * channels()};
+  }
+
+  void require_steps() const {
+    if (samples_.steps.size() != count())
+      throw InvalidArgument("samples (interpolate)", "no steps", "those of Renderer::samples(true)");
+  }
+
+ private:
+  /// Of each view by itself.
+  std::size_t rows_of_views(std::size_t numbers, std::size_t of_row, const char* name) const {
+    const std::size_t rows = numbers / (of_row * views_);
+    if (rows == 0 || rows * of_row * views_ != numbers)
+      throw InvalidArgument(checks::in(name, "interpolate"), std::to_string(numbers),
+                            "as many for each of " + std::to_string(views_) + " views");
+    return rows;
+  }
+
+  const Samples& samples_;
+  const Attributes& attributes_;
+  std::size_t of_view_, views_;
+  std::size_t faces_ = 0, row_stride_ = 0;  // of a view; 0: all share them
+};
+
+/// Of corners 0, 1 and 2.
+std::array<float, 3> weights_of(const vec2& barycentrics) {
+  return {1 - barycentrics.x - barycentrics.y, barycentrics.x, barycentrics.y};
+}
+std::array<float, 3> changes_of(float first, float second) { return {-first - second, first, second}; }
+
+/// sum of weights[k] values[corner k]
+float mixed(std::span<const float> values, const std::array<std::size_t, 3>& corners, std::size_t channel,
+            const std::array<float, 3>& weights) {
+  return weights[0] * values[corners[0] + channel] + weights[1] * values[corners[1] + channel] +
+         weights[2] * values[corners[2] + channel];
+}
+
+}  // namespace
+
+std::vector<float> interpolate(const Samples& samples, const Attributes& attributes) {
+  const Table table(samples, attributes);
+  std::vector<float> found(table.count() * table.channels());
+  for (std::size_t i = 0; i < table.count(); ++i) {
+    if (table.is_empty(i)) continue;
+    const auto corners = table.corners(i);
+    const auto weights = weights_of(samples.barycentrics[i]);
+    for (std::size_t c = 0; c < table.channels(); ++c)
+      found[i * table.channels() + c] = mixed(attributes.values, corners, c, weights);
+  }
+  return found;
+}
+
+std::vector<float> interpolate_steps(const Samples& samples, const Attributes& attributes) {
+  const Table table(samples, attributes);
+  table.require_steps();
+  std::vector<float> found(2 * table.count() * table.channels());
+  for (std::size_t i = 0; i < table.count(); ++i) {
+    if (table.is_empty(i)) continue;
+    const auto corners = table.corners(i);
+    const vec4& step = samples.steps[i];
+    const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+    for (std::size_t c = 0; c < table.channels(); ++c) {
+      float* to = &found[2 * (i * table.channels() + c)];
+      to[0] = mixed(attributes.values, corners, c, right);
+      to[1] = mixed(attributes.values, corners, c, down);
+    }
+  }
+  return found;
+}
+
+InterpolateGradient interpolate_backward(const Samples& samples, const Attributes& attributes,
+                                         std::span<const float> grad_values,
+                                         std::span<const float> grad_steps) {
+  const Table table(samples, attributes);
+  checks::require_numbers(grad_values, table.count() * table.channels(), "grad_values (interpolate)");
+  if (!grad_steps.empty()) {
+    table.require_steps();
+    checks::require_numbers(grad_steps, 2 * grad_values.size(), "grad_steps (interpolate)");
+  }
+  InterpolateGradient found{std::vector<float>(attributes.values.size()), std::vector<vec2>(table.count())};
+  for (std::size_t i = 0; i < table.count(); ++i) {
+    if (table.is_empty(i)) continue;
+    const auto corners = table.corners(i);
+    const auto add = [&](std::size_t channel, float grad, const std::array<float, 3>& weights) {
+      for (std::size_t k = 0; k < 3; ++k) found.values[corners[k] + channel] += grad * weights[k];
+    };
+    const auto weights = weights_of(samples.barycentrics[i]);
+    for (std::size_t c = 0; c < table.channels(); ++c) {
+      const float grad = grad_values[i * table.channels() + c];
+      add(c, grad, weights);
+      found.barycentrics[i].x += grad * mixed(attributes.values, corners, c, changes_of(1, 0));
+      found.barycentrics[i].y += grad * mixed(attributes.values, corners, c, changes_of(0, 1));
+      if (grad_steps.empty()) continue;
+      const vec4& step = samples.steps[i];
+      const float* of_step = &grad_steps[2 * (i * table.channels() + c)];
+      add(c, of_step[0], changes_of(step.x, step.z));
+      add(c, of_step[1], changes_of(step.y, step.w));
+    }
+  }
+  return found;
+}
+
+std::vector<float> interpolate_tangent(const Samples& samples, const Attributes& attributes,
+                                       std::span<const float> value_tangents,
+                                       std::span<const vec2> barycentric_tangents) {
+  const Table table(samples, attributes);
+  if (!value_tangents.empty()) checks::require_numbers(value_tangents, attributes.values.size(), "value_tangents (interpolate)");
+  if (!barycentric_tangents.empty())
+    checks::require_numbers(checks::floats_of(barycentric_tangents), 2 * table.count(), "barycentric_tangents (interpolate)");
+  std::vector<float> found(table.count() * table.channels());
+  for (std::size_t i = 0; i < table.count(); ++i) {
+    if (table.is_empty(i)) continue;
+    const auto corners = table.corners(i);
+    const auto weights = weights_of(samples.barycentrics[i]);
+    const vec2 moved = barycentric_tangents.empty() ? vec2(0) : barycentric_tangents[i];
+    for (std::size_t c = 0; c < table.channels(); ++c) {
+      float& tangent = found[i * table.channels() + c];
+      if (!value_tangents.empty()) tangent += mixed(value_tangents, corners, c, weights);
+      tangent += mixed(attributes.values, corners, c, changes_of(moved.x, moved.y));
+    }
+  }
+  return found;
+}
+
+}  // namespace dpr
