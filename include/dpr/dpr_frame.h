@@ -123,44 +123,6 @@ DPR_API dpr_status dpr_frame_backward(dpr_frame* frame, const dpr_array* grads, 
 DPR_API dpr_status dpr_frame_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
                                      size_t tangent_count, float* pixels, size_t pixel_count);
 
-/* Shading of the caller's own, with noise on the pixel (preset "pixel") around it: what the samples of the rigid image
- * show, and images of the values that the caller finds for them. Of frames without lights; colours and textures have no
- * part in it. The samples of a view are a raster from the top left, `supersampling` a pixel and axis, with a margin
- * around the image. They show the nearest surface alone, or by the setting "layers=L" the nearest L, for values that
- * blend these as see-through: contours count then unless L surfaces hide them. */
-typedef struct dpr_raster {
-  int width, height, supersampling, margin; /* samples */
-  int layers;
-} dpr_raster;
-
-DPR_API dpr_status dpr_frame_raster(dpr_frame* frame, dpr_raster* raster);
-/* Fills those that are named: DPR_INT64 "face_id" [L N, h, w], -1 where nothing is; "barycentrics" [L N, h, w, 3], of
- * the face's corners, and "depth" [L N, h, w] along the view direction, world units, both 0 where nothing is. The N
- * views of the nearest layer come first. Waits for the device. */
-DPR_API dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples, size_t count);
-/* The gradients of sum <grads, samples>, of "barycentrics" and "depth", into `gradients` as dpr_frame_backward() has
- * them: of vertices, views and intrinsics. Where samples jump from face to face dpr_frame_resolve_backward() has the
- * rest. */
-DPR_API dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, size_t grad_count,
-                                              const dpr_array* gradients, size_t gradient_count);
-/* From values of the samples, [N, h, w, C] with any number of channels, to images [N, height, width, C]: blended across
- * contours and blurred. Linear in the values, which samples without a face need too. */
-DPR_API dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images);
-/* The gradients of sum <grad_images, images>: of the values, and into `gradients` of vertices, views and intrinsics by
- * way of the contours. That of sigma is refused. */
-DPR_API dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values,
-                                              const dpr_array* grad_images, const dpr_array* grad_values,
-                                              const dpr_array* gradients, size_t gradient_count);
-/* Forward mode of dpr_frame_samples(), along directions as dpr_frame_tangent() takes them: "barycentrics"
- * [directions L N, h, w, 3] and "depth" [directions L N, h, w]. */
-DPR_API dpr_status dpr_frame_samples_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
-                                             size_t tangent_count, const dpr_array* samples,
-                                             size_t sample_count);
-/* Forward mode of dpr_frame_resolve(), along directions in which values change by value_tangents
- * [directions N, h, w, C] as well: images [directions N, height, width, C]. */
-DPR_API dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, size_t directions, const dpr_array* tangents,
-                                             size_t tangent_count, const dpr_array* values,
-                                             const dpr_array* value_tangents, const dpr_array* images);
 /* Not 0: no triangle of any view was rendered. */
 DPR_API dpr_status dpr_frame_is_empty(dpr_frame* frame, int* is_empty);
 DPR_API void dpr_frame_destroy(dpr_frame* frame);
@@ -237,5 +199,7 @@ DPR_API dpr_status dpr_image_file_write(const char* path, const char* encoding, 
 #ifdef __cplusplus
 }
 #endif
+
+#include "dpr/dpr_own_shading.h"
 
 #endif

@@ -59,15 +59,19 @@ void Batch::require_samples(const NamedArray& array, std::size_t directions) {
       "[" + std::to_string(rows) + ", " + std::to_string(height) + ", " + std::to_string(width);
   if (array.name == "face_id") require_form(array, Element::int64, {{rows, height, width}}, form + "]");
   if (array.name == "barycentrics") require_floats(array, {rows, height, width, k_corners}, form + ", 3]");
+  if (array.name == "barycentric_steps") require_floats(array, {rows, height, width, 4}, form + ", 4]");
   if (array.name == "depth") require_floats(array, {rows, height, width}, form + "]");
 }
 
 void Batch::read_samples(NamedArrays samples) {
   for (const NamedArray& array : samples) {
-    require_one_of(array, {"face_id", "barycentrics", "depth"}, "face_id, barycentrics or depth");
+    require_one_of(array, {"face_id", "barycentrics", "depth", "barycentric_steps"},
+                   "face_id, barycentrics, depth or barycentric_steps");
     require_samples(array, 1);
   }
-  const Samples found = frame_.renderer().samples();
+  const NamedArray* const steps = find(samples, "barycentric_steps");
+  const Samples found = frame_.renderer().samples(steps != nullptr);
+  if (steps) std::ranges::copy(found.steps, steps->rows<vec4>().begin());
   for (const NamedArray& array : samples) {
     if (array.name == "face_id") std::ranges::copy(found.faces, static_cast<std::int64_t*>(array.data));
     if (array.name == "depth") std::ranges::copy(found.depths, array.rows<float>().begin());

@@ -22,6 +22,7 @@ struct TextureLookup {
   Border border;
   Filter filter;
   bool is_v_up;  ///< otherwise v is 0 at row 0
+  bool is_level_rounded = false;  ///< one version is read, and not two blended
 
   std::size_t dimensions() const { return border == Border::cube ? 3 : 2; }
   std::size_t count(const TexturePlaces& places) const { return places.coordinates.size() / dimensions(); }

@@ -71,7 +71,7 @@ inline std::array<float, 3> direction_of(std::size_t face, float s, float t) {
 
 template <class T>
 struct Tap {
-  std::size_t level = 0, texel = 0;
+  std::size_t level, texel;
   T weight;
 };
 
@@ -84,7 +84,7 @@ class Taps {
   auto end() const { return all_.begin() + count_; }
 
  private:
-  std::array<Tap<T>, 12> all_;
+  std::array<Tap<T>, 12> all_;  // of which `count_` are set
   std::ptrdiff_t count_ = 0;
 };
 
@@ -218,6 +218,7 @@ Taps<T> taps_of(const TextureLookup& texture, const Reads& reads, const Inputs& 
     const std::size_t last = texture.levels.size() - 1;
     T level = reads.steps ? level_of(texture, place) : T(0);
     if (reads.levels) level = T(level + inputs(3 * Dimensions));
+    if (texture.is_level_rounded) level = T(std::floor(value_of(level) + 0.5F));
     level = bounded(level, 0, static_cast<float>(last));
     const std::size_t lower = std::min(static_cast<std::size_t>(value_of(level)), last - 1);
     const T part = level - static_cast<float>(lower);

@@ -1,15 +1,15 @@
 """Textures of dpr.nvdiffrast."""
-import functools
 from typing import List, Optional, Sequence, Union
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from . import _arrays, _rows
+from . import _arrays, _frames, _library, _torch
 
-_FILTERS = ("auto", "nearest", "linear", "linear-mipmap-nearest", "linear-mipmap-linear")
-_BOUNDARIES = ("wrap", "clamp", "zero", "cube")
-_LEAST_AREA = 1e-12  # of footprints, in texels
+# In the library's words.
+_FILTERS = {"nearest": "nearest", "linear": "bilinear", "linear-mipmap-nearest": "mipmap", "linear-mipmap-linear": "trilinear"}
+_BOUNDARIES = {"wrap": "repeat", "clamp": "clamp", "zero": "zero", "cube": "clamp"}
 
 
 def _fail(name, got, expected, error=ValueError, call="texture"):
@@ -68,140 +68,78 @@ def texture_construct_mip(tex: Tensor, max_mip_level: Optional[int] = None, cube
     return Mip(_smaller(tex, max_mip_level), cube_mode)
 
 
-@functools.lru_cache(maxsize=64)
-def _cube_places(size):
-    """(places, corners) of faces with a border one texel wide. places [6 (size + 2)^2]: rows of a table that holds the
-    6 size^2 texels and then 24 means for the borders' corners. corners [24, 3]: the texels of each mean."""
-    line = (torch.arange(size + 2, dtype=torch.float64) - 0.5) / size
-    t, s = torch.meshgrid(line, line, indexing="ij")
-    x, y, one = 2 * s - 1, 2 * t - 1, torch.ones_like(s)
-    directions = torch.stack([torch.stack(axes, -1) for axes in (
-        (one, -y, -x), (-one, -y, x), (x, one, y), (x, -one, -y), (x, -y, one), (-x, -y, -one))])
-    face, coords, _ = _on_cube(directions.reshape(-1, 3))
-    column, row = (coords * size).floor().long().clamp(0, size - 1).unbind(-1)
-    places = ((face * size + row) * size + column).reshape(6, size + 2, size + 2)
-    ends = torch.tensor([0, -1])
-    inner = torch.tensor([1, -2])
-    columns = places[:, ends[:, None], inner], places[:, inner[:, None], ends], places[:, inner[:, None], inner]
-    places[:, ends[:, None], ends] = (6 * size * size + torch.arange(24)).reshape(6, 2, 2)
-    return places.reshape(-1), torch.stack([column.reshape(-1) for column in columns], -1)
+def _one(array):
+    return _frames.c_arrays([("values", array)])[0]
 
 
-def _on_cube(direction, footprint=None):
-    """(face [K], (s, t) on that face [K, 2], footprint of (s, t) [K, 2, 2]) of directions [K, 3] with the footprint
-    [K, 3, 2], their change per pixel to the right and up. Faces are OpenGL's. Differentiable."""
-    size = direction.detach().abs()
-    axis = torch.where(size[:, 2] > size[:, :2].amax(1), 2, torch.where(size[:, 1] > size[:, 0], 1, 0))
-    sign = torch.where(direction.detach().gather(1, axis[:, None])[:, 0] < 0, -1, 1)
-    axes = torch.stack([torch.tensor([2, 0, 0])[axis], torch.tensor([1, 2, 1])[axis], axis], 1)
-    plus = torch.ones_like(sign)
-    signs = torch.stack([torch.where(axis == 0, -sign, torch.where(axis == 1, plus, sign)),
-                         torch.where(axis == 1, sign, -plus), sign], 1).to(direction.dtype)
-    turned = direction.gather(1, axes) * signs
-    depth = turned[:, 2:] + (turned[:, 2:] == 0)
-    on_face = turned[:, :2] / depth
-    if footprint is not None:
-        turned = footprint.gather(1, axes[..., None].expand(-1, -1, 2)) * signs[..., None]
-        footprint = 0.5 * (turned[:, :2] - on_face[..., None] * turned[:, 2:]) / depth[..., None]
-    return 2 * axis + (sign < 0).long(), on_face * 0.5 + 0.5, footprint
+class _Lookup:
+    """A call's words and the names of its tensors, as the library has them."""
+
+    def __init__(self, names, wrap, filter_mode):
+        self.names, self.words = names, (wrap.encode(), filter_mode.encode())
+
+    def arrays(self, tensors):
+        return _frames.c_arrays(list(zip(self.names, map(_packed, tensors))))
 
 
-class _Texels:
-    """All mip levels of a texture in one table of texels."""
+def _packed(tensor):
+    return np.ascontiguousarray(_arrays.to_numpy(tensor))
 
-    def __init__(self, levels, boundary):
-        channels = levels[0].shape[-1]
-        self.boundary, parts, self._first, self._places_first, places = boundary, [], [], [], []
-        row = place = 0
-        for level in levels:
-            flat = level.reshape(-1, channels)
-            if boundary == "cube":
-                texels = level.flatten(1, -2)
-                own_places, corners = _cube_places(level.shape[-2])
-                means = sum(texels[:, corner] for corner in corners.unbind(1)) / 3
-                flat = torch.cat([texels, means], 1).reshape(-1, channels)
-                places.append(own_places)
-                self._places_first.append(place)
-                place += len(own_places)
-            parts.append(flat)
-            self._first.append(row)
-            row += len(flat)
-        self._zero, self._count = row, len(levels)
-        if boundary == "zero":
-            parts.append(parts[0].new_zeros(1, channels))
-        self.table = torch.cat(parts) if len(parts) > 1 else parts[0]
-        self._heights, self._widths = ([level.shape[axis] for level in levels] for axis in (-3, -2))
-        self._places = torch.cat(places) if places else None
 
-    def __len__(self):
-        return self._count
+@_torch.one_forward
+class _Gradients(_torch.Derivative):
+    """(gradient of the values, all tensors) to those of the tensors with these numbers."""
 
-    def _of(self, numbers, level):
-        return numbers[0] if self._count == 1 else torch.tensor(numbers).index_select(0, level)
+    @staticmethod
+    def forward(lookup, numbers, grad_values, *tensors):
+        kept, grad = list(map(_packed, tensors)), _packed(grad_values)
+        found = [np.empty(kept[i].shape, np.float32) for i in numbers]
+        named = [(lookup.names[i], array) for i, array in zip(numbers, found)]
+        _library.call("dpr_texture_map_backward", *lookup.arrays(kept), *lookup.words, _one(grad), *_frames.c_arrays(named))
+        return tuple(map(torch.from_numpy, found))
 
-    def _within(self, place, size):
-        """(texel, whether it exists, None for always) for texels -1 to size along an axis. Cube maps count from their
-        border."""
-        if self.boundary == "cube":
-            return place + 1, None
-        last = size - 1
-        if self.boundary == "wrap":
-            return torch.where(place < 0, last, torch.where(place > last, 0, place)), None
-        is_inside = (place >= 0) & (place <= last) if self.boundary == "zero" else None
-        return torch.where(place < 0, 0, torch.where(place > last, last, place)), is_inside
 
-    def _rows(self, level, batch, face, columns, rows):
-        """Table rows of the texels in these rows and columns, row by row."""
-        height, width, first = (self._of(numbers, level) for numbers in (self._heights, self._widths, self._first))
-        columns = [self._within(place, width) for place in columns]
-        rows = [self._within(place, height) for place in rows]
-        if self.boundary == "cube":
-            first, of_batch = self._of(self._places_first, level), first + batch * (6 * width * width + 24)
-            lines = [first + (face * (width + 2) + row) * (width + 2) for row, _ in rows]
-            return [of_batch + self._places.index_select(0, line + column) for line in lines for column, _ in columns]
-        lines = [(first + (batch * height + row) * width, is_inside) for row, is_inside in rows]
-        if self.boundary != "zero":
-            return [line + column for line, _ in lines for column, _ in columns]
-        return [torch.where(of_line & of_column, line + column, self._zero)
-                for line, of_line in lines for column, of_column in columns]
+@_torch.one_forward
+class _Tangents(_torch.Derivative):
+    """(tangents of the tensors with these numbers, all tensors) to that of the values."""
 
-    def _places_of(self, level, coords):
-        """(x, y) in texels, [K] each."""
-        if self.boundary == "wrap":
-            coords = coords - coords.detach().floor()
-        elif self.boundary in ("clamp", "cube"):
-            coords = coords.clamp(0, 1)
-        else:
-            coords = coords.clamp(-2, 3)
-        return coords[:, 0] * self._of(self._widths, level), coords[:, 1] * self._of(self._heights, level)
+    @staticmethod
+    def forward(lookup, numbers, channels, *tensors):
+        moving, kept = (list(map(_packed, part)) for part in (tensors[:len(numbers)], tensors[len(numbers):]))
+        found = np.empty((*kept[0].shape[:3], channels), np.float32)
+        named = [(lookup.names[i], array) for i, array in zip(numbers, moving)]
+        _library.call("dpr_texture_map_tangent", *lookup.arrays(kept), *lookup.words, *_frames.c_arrays(named), _one(found))
+        return torch.from_numpy(found)
 
-    def nearest(self, batch, face, coords):
-        x, y = (place.detach().floor().long() for place in self._places_of(0, coords))
-        if self.boundary == "cube":
-            x, y = (place.clamp(max=self._widths[0] - 1) for place in (x, y))
-        return _rows.rows(self.table, self._rows(0, batch, face, [x], [y])[0])
 
-    def linear(self, level, batch, face, coords):
-        """(indices [4, K], weights [4, K]) of the four texels around each place."""
-        x, y = (place - 0.5 for place in self._places_of(level, coords))
-        column, row = x.detach().floor(), y.detach().floor()
-        x, y, column, row = x - column, y - row, column.long(), row.long()
-        index = self._rows(level, batch, face, [column, column + 1], [row, row + 1])
-        return torch.stack(index), torch.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y])
+@_torch.one_forward
+class _Texture(torch.autograd.Function):
+    """(coordinates and what else the library reads, texels among it) to values."""
 
-    def level_of(self, footprint, bias):
-        """Fractional mip levels [K], by the longer axis of the ellipse that a pixel covers."""
-        level = 0.0
-        if footprint is not None:
-            area = footprint * footprint.new_tensor([[self._widths[0]], [self._heights[0]]])
-            across, up = area[..., 0], area[..., 1]
-            a, b, c = (left[:, 0] * right[:, 0] + left[:, 1] * right[:, 1]
-                       for left, right in ((across, across), (up, up), (across, up)))
-            root = (0.25 * (a - b).square() + c.square()).clamp(min=_LEAST_AREA ** 2).sqrt()
-            level = 0.5 * torch.log2((0.5 * (a + b) + root).clamp(min=_LEAST_AREA))
-        if bias is not None:
-            level = level + bias.reshape(-1)
-        return torch.nan_to_num(level, 0.0).clamp(0, self._count - 1)
+    @staticmethod
+    def forward(lookup, *tensors):
+        kept = list(map(_packed, tensors))
+        found = np.empty((*kept[0].shape[:3], kept[-1].shape[-1]), np.float32)
+        _library.call("dpr_texture_map", *lookup.arrays(kept), *lookup.words, _one(found))
+        return torch.from_numpy(found)
+
+    @staticmethod
+    def setup_context(ctx, inputs, outputs):
+        ctx.lookup, *tensors = inputs
+        ctx.channels = outputs.shape[-1]
+        ctx.save_for_backward(*tensors)
+        ctx.save_for_forward(*tensors)
+
+    @staticmethod
+    def backward(ctx, grad_values):
+        numbers = [i for i, wanted in enumerate(ctx.needs_input_grad[1:]) if wanted]
+        found = dict(zip(numbers, _Gradients.apply(ctx.lookup, numbers, grad_values, *ctx.saved_tensors)))
+        return (None, *(found.get(i) for i in range(len(ctx.saved_tensors))))
+
+    @staticmethod
+    def jvp(ctx, _, *tangents):
+        numbers = [i for i, tangent in enumerate(tangents) if tangent is not None]
+        return _Tangents.apply(ctx.lookup, numbers, ctx.channels, *(tangents[i] for i in numbers), *ctx.saved_tensors)
 
 
 def _levels(tex, mip, most, is_cube):
@@ -221,6 +159,7 @@ def _levels(tex, mip, most, is_cube):
     return [tex, *(mip if most is None else mip[:most])]
 
 
+@_arrays.named("dpr.nvdiffrast.texture")
 def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_bias: Optional[Tensor] = None,
             mip: Union[Mip, Sequence[Tensor], None] = None, filter_mode: str = "auto", boundary_mode: str = "wrap",
             max_mip_level: Optional[int] = None) -> Tensor:
@@ -239,14 +178,14 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
 
     Gradients reach tex and mip; uv unless the filter is "nearest"; and with "linear-mipmap-linear" uv_da and
     mip_level_bias."""
-    for name, word, words in (("filter_mode", filter_mode, _FILTERS), ("boundary_mode", boundary_mode, _BOUNDARIES)):
+    for name, word, words in (("filter_mode", filter_mode, ("auto", *_FILTERS)), ("boundary_mode", boundary_mode, _BOUNDARIES)):
         if word not in words:
             _fail(name, repr(word), "one of " + ", ".join(words))
     is_cube = boundary_mode == "cube"
     _check_texture(tex, is_cube)
     size = 3 if is_cube else 2
     check_floats("uv", uv, (4,), f"[N, H, W, {size}]", "texture")
-    shape, count = tuple(uv.shape[:3]), uv.shape[:3].numel()
+    shape = tuple(uv.shape[:3])
     for name, array, wanted in (("uv", uv, (*shape, size)), ("uv_da", uv_da, (*shape, 2 * size)),
                                 ("mip_level_bias", mip_level_bias, shape)):
         if array is not None:
@@ -262,25 +201,11 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
     if is_mipmap and not has_levels:
         _fail("uv_da", "None", f"it or mip_level_bias with filter_mode={filter_mode!r}")
 
-    texels = _Texels(_levels(tex, mip, max_mip_level, is_cube) if is_mipmap else [tex], boundary_mode)
-    batch = torch.arange(shape[0]).repeat_interleave(count // shape[0]) if len(tex) > 1 else 0
-    coords = torch.nan_to_num(uv, 0.0, 0.0, 0.0).reshape(count, size)
-    footprint = uv_da.reshape(count, size, 2) if is_mipmap and uv_da is not None else None
-    face = 0
-    if is_cube:
-        face, coords, footprint = _on_cube(coords, footprint)
-    if filter_mode == "nearest":
-        return texels.nearest(batch, face, coords).reshape(*shape, -1)
-    if not is_mipmap:
-        taps = [texels.linear(0, batch, face, coords)]
-    else:
-        level = texels.level_of(footprint, mip_level_bias)
-        if filter_mode == "linear-mipmap-nearest":
-            taps = [texels.linear((level.detach() + 0.5).floor().long(), batch, face, coords)]
-        else:
-            lower = level.detach().floor().long().clamp(max=max(len(texels) - 2, 0))
-            upper, part = (lower + 1).clamp(max=len(texels) - 1), level - lower
-            taps = [(index, weights * of_level) for (index, weights), of_level in (
-                (texels.linear(lower, batch, face, coords), 1 - part),
-                (texels.linear(upper, batch, face, coords), part))]
-    return _rows.mixed(texels.table, *(torch.cat(parts) for parts in zip(*taps))).reshape(*shape, -1)
+    levels = _levels(tex, mip, max_mip_level, is_cube) if is_mipmap else [tex]
+    given = {"directions" if is_cube else "places": uv}
+    if is_mipmap:
+        given.update({name: array for name, array in (("steps", uv_da), ("levels", mip_level_bias)) if array is not None})
+    tensors = [torch.nan_to_num(array, 0.0, 0.0, 0.0) for array in given.values()]
+    names = [*given, *(f"texels[{i}]" for i in range(len(levels)))]
+    lookup = _Lookup(names, _BOUNDARIES[boundary_mode], _FILTERS[filter_mode])
+    return _Texture.apply(lookup, *tensors, *(level.flatten(0, -4) for level in levels))

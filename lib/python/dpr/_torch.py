@@ -36,7 +36,7 @@ class _Call:
         self.spec, self.wanted, self.rendered = spec, wanted, None
 
 
-def _one_forward(function):
+def one_forward(function):
     """For PyTorch whose forward() does what setup_context() does later."""
     if _HAS_CONTEXT:
         return function
@@ -51,7 +51,7 @@ def _one_forward(function):
     return function
 
 
-class _Derivative(torch.autograd.Function):
+class Derivative(torch.autograd.Function):
     """One that has none itself. The tensors by which it was taken are among its arguments: a second one is refused, not
     dropped."""
 
@@ -67,8 +67,8 @@ class _Derivative(torch.autograd.Function):
     jvp = backward
 
 
-@_one_forward
-class _Gradients(_Derivative):
+@one_forward
+class _Gradients(Derivative):
     """(gradients of `count` outputs, all tensors) to gradients of the wanted tensors."""
 
     @staticmethod
@@ -91,8 +91,8 @@ def _stretched(info, tensors, dimensions):
     return [row.flatten(0, 1) for row in rows]
 
 
-@_one_forward
-class _Tangents(_Derivative):
+@one_forward
+class _Tangents(Derivative):
     """(tangents [K, ...] of the tensors with these numbers, all tensors) to the images' tangents, [K, ...]."""
 
     @staticmethod
@@ -115,7 +115,7 @@ class _OfOneCall(torch.autograd.Function):
                                   "directions or gradients: a call takes N views, shapes or meshes")
 
 
-@_one_forward
+@one_forward
 class _Render(_OfOneCall):
     @staticmethod
     def forward(call, *tensors):
@@ -148,8 +148,8 @@ class _Render(_OfOneCall):
         return (images[0], *(None for _ in ctx.call.spec.outputs))
 
 
-@_one_forward
-class _SampleTangents(_Derivative):
+@one_forward
+class _SampleTangents(Derivative):
     """(tangents [K, ...] of the tensors with these numbers, all tensors) to those of barycentrics and depth, [K, ...]."""
 
     @staticmethod
@@ -164,8 +164,8 @@ class _SampleTangents(_Derivative):
         return tuple(tensor.unflatten(0, (info.batch_size, -1)) for tensor in found), (0, 0)
 
 
-@_one_forward
-class _ImageTangents(_Derivative):
+@one_forward
+class _ImageTangents(Derivative):
     """(tangents [K, ...] of the values and of the tensors with these numbers, the values, all tensors) to those of the
     images, [K, ...]."""
 
@@ -183,8 +183,8 @@ class _ImageTangents(_Derivative):
         return images.unflatten(0, (info.batch_size, -1)), 0
 
 
-@_one_forward
-class _SampleGradients(_Derivative):
+@one_forward
+class _SampleGradients(Derivative):
     """(gradients of barycentrics and depth, all tensors) to those of the wanted tensors."""
 
     @staticmethod
@@ -193,8 +193,8 @@ class _SampleGradients(_Derivative):
         return tuple(_tensor(found[i]) for i in call.wanted)
 
 
-@_one_forward
-class _ResolveGradients(_Derivative):
+@one_forward
+class _ResolveGradients(Derivative):
     """(gradient of the images, the values, all tensors) to those of the values and of the wanted tensors."""
 
     @staticmethod
@@ -203,7 +203,7 @@ class _ResolveGradients(_Derivative):
         return tuple(_tensor(array) for array in (grad_values, *(found[i] for i in rasterized.leaves)))
 
 
-@_one_forward
+@one_forward
 class _Rasterize(_OfOneCall):
     """(tensors of a call) to face_id, barycentrics and depth."""
 
@@ -235,7 +235,7 @@ class _Rasterize(_OfOneCall):
         return (None, *(tangent[0] for tangent in found))
 
 
-@_one_forward
+@one_forward
 class _Resolve(_OfOneCall):
     """(values of the samples, tensors of the call) to images."""
 
