@@ -50,9 +50,10 @@ kernel void samples_steps(const FrameParams p, const uint count, global const fl
     steps[sample] = 0.0f;
     return;
   }
-  const size_t view = (sample % samples_of_frame(p)) / (p.width * p.height), of_view = view * p.faces + face[sample];
+  const size_t view = (sample % samples_of_frame(p)) / (p.width * p.height),
+               of_view = view * p.faces + face[sample];
   const Steps s = p.clips && clipped[of_view].corners != 0 ? clipped_steps(clipped[of_view])
-                                                            : triangle_steps(p, triangles[of_view]);
+                                                           : triangle_steps(p, triangles[of_view]);
   const float c1 = places[sample].x, c2 = places[sample].y;
   const float scale = p.pixel_size * ((1.0f - c1 - c2) * s.depth.x + c1 * s.depth.y + c2 * s.depth.z);
   const float all_x = s.q_x.x + s.q_x.y + s.q_x.z, all_y = s.q_y.x + s.q_y.y + s.q_y.z;

@@ -58,8 +58,8 @@ DPR_API dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, size_t directions
  * sample to the right and down. */
 DPR_API dpr_status dpr_interpolate(const dpr_array* arrays, size_t count, const dpr_array* outputs,
                                    size_t output_count);
-/* The gradients of sum <grads, outputs>, of "attributes" and "barycentrics", which are those of corners 1 and 2: corner 0
- * has the rest, and gradient 0. barycentric_steps count as constant. */
+/* The gradients of sum <grads, outputs>, of "attributes" and "barycentrics", which are those of corners 1 and 2: corner
+ * 0 has the rest, and gradient 0. barycentric_steps count as constant. */
 DPR_API dpr_status dpr_interpolate_backward(const dpr_array* arrays, size_t count, const dpr_array* grads,
                                             size_t grad_count, const dpr_array* gradients,
                                             size_t gradient_count);
@@ -78,19 +78,19 @@ DPR_API dpr_status dpr_interpolate_tangent(const dpr_array* arrays, size_t count
  *                                      level
  *   texels[1], ...       instead of smaller versions that are made here: each half as large, rounded down
  *
- * filter: "nearest", "bilinear" (NULL), "trilinear", which blends two smaller versions by steps and levels, or "mipmap",
- * which reads the one next to the level. wrap: "repeat" (NULL), "mirror", "clamp" or "zero"; cube maps go on beyond the
+ * filter: "nearest", "bilinear" (NULL), "trilinear", which blends two smaller versions by steps and levels, or
+ * "mipmap", which reads the one next to the level. wrap: "repeat" (NULL), "mirror", "clamp" or "zero"; cube maps go on beyond the
  * borders of their faces. */
-DPR_API dpr_status dpr_texture_map(const dpr_array* arrays, size_t count, const char* wrap, const char* filter,
-                               const dpr_array* values);
+DPR_API dpr_status dpr_texture_map(const dpr_array* arrays, size_t count, const char* wrap,
+                                   const char* filter, const dpr_array* values);
 /* The gradients of sum <grad_values, values>, of the arrays that `gradients` names. */
 DPR_API dpr_status dpr_texture_map_backward(const dpr_array* arrays, size_t count, const char* wrap,
-                                        const char* filter, const dpr_array* grad_values,
-                                        const dpr_array* gradients, size_t gradient_count);
+                                            const char* filter, const dpr_array* grad_values,
+                                            const dpr_array* gradients, size_t gradient_count);
 /* Forward mode along one direction, in which the arrays that `tangents` name change. */
 DPR_API dpr_status dpr_texture_map_tangent(const dpr_array* arrays, size_t count, const char* wrap,
-                                       const char* filter, const dpr_array* tangents, size_t tangent_count,
-                                       const dpr_array* values);
+                                           const char* filter, const dpr_array* tangents,
+                                           size_t tangent_count, const dpr_array* values);
 
 #ifdef __cplusplus
 }

@@ -15,14 +15,14 @@ struct Attributes {
   std::span<const uvec3> faces;   ///< of the scene, the meshes' one after the other: indices of rows
   std::span<const float> values;  ///< [row][channel]
   std::size_t channels = 3;
-  bool are_of_views = false;       ///< values [view][row][channel]
+  bool are_of_views = false;        ///< values [view][row][channel]
   bool faces_are_of_views = false;  ///< faces [view][face]
 };
 
 /// [layer][view][height][width][channel] at the samples, with perspective; 0 where no face is. Works on the host;
-/// O(samples channels). Throws InvalidArgument for indices beyond the rows, and faces that are not those of the samples.
+/// O(samples channels). Throws InvalidArgument for indices beyond the rows, and faces that are not the samples'.
 DPR_API std::vector<float> interpolate(const Samples& samples, const Attributes& attributes);
-/// [layer][view][height][width][channel][2]: how fast they change from pixel to pixel to the right and down. Of
+/// [layer][view][height][width][channel][2]: how fast they change from sample to sample to the right and down. Of
 /// samples that have steps.
 DPR_API std::vector<float> interpolate_steps(const Samples& samples, const Attributes& attributes);
 

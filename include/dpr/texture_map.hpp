@@ -14,10 +14,10 @@ namespace dpr {
 struct TexturePlaces {
   /// [place][2] u and v as Texture has them, v up; of cube maps directions [place][3] of any length
   std::span<const float> coordinates{};
-  /// [place][coordinate][2], or none: the coordinates' change from pixel to pixel along x and y, of which
-  /// interpolate_steps() knows. The longer axis of the ellipse that a pixel covers says which level is read.
+  /// [place][coordinate][2], or none: the coordinates' change from sample to sample along x and y, as
+  /// interpolate_steps() finds it. The longer axis of the ellipse that a sample covers says which level is read.
   std::span<const float> steps{};
-  /// [place], or none: added to the level, the logarithm to base 2 of texels a pixel; without steps the level
+  /// [place], or none: added to the level, the logarithm to base 2 of texels a sample; without steps the level
   std::span<const float> levels{};
 };
 
@@ -37,8 +37,8 @@ class DPR_API TextureMap {
   explicit TextureMap(const Texture& texture);
   /// texels: [height][width][channel], row 0 on top, where v is 1.
   TextureMap(std::vector<float> texels, int width, int height, Wrap wrap, Filter filter);
-  /// texels: [6][side][side][channel], OpenGL's faces +x, -x, +y, -y, +z, -z, row 0 at t = 0. Beyond a face's border its
-  /// neighbour goes on.
+  /// texels: [6][side][side][channel], OpenGL's faces +x, -x, +y, -y, +z, -z, row 0 at t = 0. Beyond a face's border
+  /// its neighbour goes on.
   static TextureMap cube(std::vector<float> texels, int side, Filter filter);
 
   std::size_t channels() const { return channels_; }

@@ -17,7 +17,8 @@ namespace {
 class InterpolateCall {
  public:
   explicit InterpolateCall(NamedArrays arrays)
-      : face_id_(require(arrays, "face_id")), barycentrics_(require(arrays, "barycentrics")),
+      : face_id_(require(arrays, "face_id")),
+        barycentrics_(require(arrays, "barycentrics")),
         attributes_(require(arrays, "attributes")) {
     for (const NamedArray& array : arrays)
       if (array.name != "face_id" && array.name != "barycentrics" && array.name != "barycentric_steps" &&
@@ -26,17 +27,21 @@ class InterpolateCall {
                               "face_id, barycentrics, barycentric_steps, attributes or faces");
     require_form(face_id_, Element::int64, {{k_any, k_any, k_any}}, "[N, h, w]");
     require_at_samples(barycentrics_, 3, "[N, h, w, 3], as face_id");
-    require_form(attributes_, Element::float32, {{k_any, k_any}, {k_any, k_any, k_any}}, "[V, C] or [N, V, C]");
+    require_form(attributes_, Element::float32, {{k_any, k_any}, {k_any, k_any, k_any}},
+                 "[V, C] or [N, V, C]");
     const NamedArray& faces = require(arrays, "faces");
-    const auto views_of = [](const NamedArray& array) { return array.shape.size() == 3 ? array.shape[0] : 1; };
+    const auto views_of = [](const NamedArray& array) {
+      return array.shape.size() == 3 ? array.shape[0] : 1;
+    };
     const std::size_t views = std::max(views_of(attributes_), views_of(faces)), rows = face_id_.shape[0];
     faces_ = read_triples(faces, views_of(faces));
     samples_.width = static_cast<int>(face_id_.shape[2]);
     samples_.height = static_cast<int>(face_id_.shape[1]);
     samples_.layers = views > 1 ? static_cast<int>(rows / views) : 1;
     if (views == 0 || (views > 1 && rows % views != 0))
-      throw InvalidArgument(argument(face_id_), text_of(face_id_.shape),
-                            "layers of the " + std::to_string(views) + " views that attributes or faces have");
+      throw InvalidArgument(
+          argument(face_id_), text_of(face_id_.shape),
+          "layers of the " + std::to_string(views) + " views that attributes or faces have");
     for (const NamedArray* const array : {&attributes_, &faces})
       if (array->shape.size() == 3 && array->shape[0] != views)
         throw InvalidArgument(argument(*array), text_of(array->shape), std::to_string(views) + " of them");
@@ -74,7 +79,8 @@ class InterpolateCall {
         throw InvalidArgument(argument(face_id_), std::to_string(face), "faces, or -1");
       samples_.faces.push_back(static_cast<std::int32_t>(face));
     }
-    for (const glm::vec3& b : barycentrics_.rows<const glm::vec3>()) samples_.barycentrics.emplace_back(b.y, b.z);
+    for (const glm::vec3& b : barycentrics_.rows<const glm::vec3>())
+      samples_.barycentrics.emplace_back(b.y, b.z);
     if (!steps) return;
     require_at_samples(*steps, 4, "[N, h, w, 4], as face_id");
     const auto rows = steps->rows<const glm::vec4>();
@@ -171,7 +177,8 @@ using dpr::batch::to_arrays;
 dpr_status dpr_interpolate(const dpr_array* arrays, std::size_t count, const dpr_array* outputs,
                            std::size_t output_count) {
   return guarded([&] {
-    dpr::batch::interpolate_to(to_arrays(arrays, count, "arrays"), to_arrays(outputs, output_count, "outputs"));
+    dpr::batch::interpolate_to(to_arrays(arrays, count, "arrays"),
+                               to_arrays(outputs, output_count, "outputs"));
   });
 }
 

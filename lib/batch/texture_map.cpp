@@ -16,8 +16,9 @@
 namespace dpr::batch {
 namespace {
 
-constexpr std::array<std::string_view, 4> k_borders{"repeat", "mirror", "clamp", "zero"};         // as Border
-constexpr std::array<std::string_view, 4> k_filters{"nearest", "bilinear", "trilinear", "mipmap"};  // as Filter
+constexpr std::array<std::string_view, 4> k_borders{"repeat", "mirror", "clamp", "zero"};  // as Border
+constexpr std::array<std::string_view, 4> k_filters{"nearest", "bilinear", "trilinear",
+                                                    "mipmap"};  // as Filter
 constexpr std::size_t k_mipmap = 3;
 
 void require_finite(const NamedArray& array) {
@@ -130,7 +131,8 @@ class TextureCall {
       const bool are_coordinates =
           array.name == "texcoords" || array.name == "places" || array.name == "directions";
       if (are_coordinates && coordinates_)
-        throw InvalidArgument("coordinates (texture)", coordinates_->name + " and " + array.name, "one of them");
+        throw InvalidArgument("coordinates (texture)", coordinates_->name + " and " + array.name,
+                              "one of them");
       if (are_coordinates) coordinates_ = &array;
       if (!are_coordinates && array.name != "steps" && array.name != "levels" &&
           !array.name.starts_with("texels["))
@@ -155,8 +157,9 @@ class TextureCall {
                       std::min(shape[1], shape[2]) > 0 && std::max(shape[1], shape[2]) <= k_most &&
                       (!is_cube() || shape[1] == shape[2]);
     if (!fits || textures_ == 0)
-      throw InvalidArgument(argument(first), text_of(shape),
-                            form + ", sides up to " + std::to_string(k_most) + ", N: " + std::to_string(images));
+      throw InvalidArgument(
+          argument(first), text_of(shape),
+          form + ", sides up to " + std::to_string(k_most) + ", N: " + std::to_string(images));
     lookup_.channels = shape[3];
     for (given_ = 1; find(arrays_, texels_name(given_)); ++given_) {
       const NamedArray& level = require(arrays_, texels_name(given_));
@@ -209,7 +212,8 @@ class TextureCall {
       const TexturePyramid sizes = pyramid();
       const std::vector<std::vector<float>> smaller = sizes.smaller(texture.levels[0].texels);
       for (std::size_t level = 0; level < smaller.size(); ++level)
-        texture.levels.push_back({smaller[level], sizes.sizes()[level + 1].width, sizes.sizes()[level + 1].height});
+        texture.levels.push_back(
+            {smaller[level], sizes.sizes()[level + 1].width, sizes.sizes()[level + 1].height});
       function(part, texture);
     }
   }
@@ -231,9 +235,10 @@ using dpr::batch::TextureCall;
 using dpr::batch::to_arrays;
 
 dpr_status dpr_texture_map(const dpr_array* arrays, std::size_t count, const char* wrap, const char* filter,
-                       const dpr_array* values) {
+                           const dpr_array* values) {
   return guarded([&] {
-    const std::vector<NamedArray> given = to_arrays(arrays, count, "arrays"), to = to_arrays(values, 1, "values");
+    const std::vector<NamedArray> given = to_arrays(arrays, count, "arrays"),
+                                  to = to_arrays(values, 1, "values");
     const TextureCall call(given, wrap, filter);
     call.require_values(to[0]);
     call.values(to[0].rows<float>());
@@ -241,8 +246,8 @@ dpr_status dpr_texture_map(const dpr_array* arrays, std::size_t count, const cha
 }
 
 dpr_status dpr_texture_map_backward(const dpr_array* arrays, std::size_t count, const char* wrap,
-                                const char* filter, const dpr_array* grad_values,
-                                const dpr_array* gradients, std::size_t gradient_count) {
+                                    const char* filter, const dpr_array* grad_values,
+                                    const dpr_array* gradients, std::size_t gradient_count) {
   return guarded([&] {
     const std::vector<NamedArray> given = to_arrays(arrays, count, "arrays"),
                                   grad = to_arrays(grad_values, 1, "grad_values"),
@@ -255,8 +260,8 @@ dpr_status dpr_texture_map_backward(const dpr_array* arrays, std::size_t count, 
 }
 
 dpr_status dpr_texture_map_tangent(const dpr_array* arrays, std::size_t count, const char* wrap,
-                               const char* filter, const dpr_array* tangents, std::size_t tangent_count,
-                               const dpr_array* values) {
+                                   const char* filter, const dpr_array* tangents, std::size_t tangent_count,
+                                   const dpr_array* values) {
   return guarded([&] {
     const std::vector<NamedArray> given = to_arrays(arrays, count, "arrays"),
                                   moving = to_arrays(tangents, tangent_count, "tangents"),

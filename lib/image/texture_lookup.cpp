@@ -46,11 +46,14 @@ struct Places {
 /// Calls `function` with ranges of all places, on the processor's threads where there are many.
 template <class Function>
 void in_parallel(std::size_t count, const Function& function) {
-  constexpr std::size_t k_least = 1U << 14U;  // of a thread: starting one takes as long as some hundred of them
-  const std::size_t parts = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least + 1);
+  constexpr std::size_t k_least =
+      1U << 14U;  // of a thread: starting one takes as long as some hundred of them
+  const std::size_t parts =
+      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least + 1);
   std::vector<std::future<void>> others;
   for (std::size_t i = 1; i < parts; ++i)
-    others.push_back(std::async(std::launch::async, function, Places{count * i / parts, count * (i + 1) / parts}));
+    others.push_back(
+        std::async(std::launch::async, function, Places{count * i / parts, count * (i + 1) / parts}));
   function(Places{0, count / parts});
   for (std::future<void>& other : others) other.get();
 }
@@ -84,12 +87,13 @@ void look_up(const TextureLookup& texture, const TexturePlaces& places, std::spa
   std::ranges::fill(values, 0.0F);
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     in_parallel(texture.count(places), [&](const Places& range) {
-      for_each_place<Shape, float>(texture, places, range, [&](std::size_t k, const taps::Taps<float>& mixture) {
-        for (const taps::Tap<float>& tap : mixture) {
-          const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
-          for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
-        }
-      });
+      for_each_place<Shape, float>(
+          texture, places, range, [&](std::size_t k, const taps::Taps<float>& mixture) {
+            for (const taps::Tap<float>& tap : mixture) {
+              const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
+              for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
+            }
+          });
     });
   });
 }
@@ -102,12 +106,14 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     // Places share texels: one thread gathers these, in order.
     const auto gather = [&] {
-      for_each_place<Shape, float>(texture, places, {0, count}, [&](std::size_t k, const taps::Taps<float>& mixture) {
-        for (const taps::Tap<float>& tap : mixture) {
-          float* grad = &gradients.texels[tap.level][channels * tap.texel];
-          for (std::size_t c = 0; c < channels; ++c) grad[c] += tap.weight * grad_values[channels * k + c];
-        }
-      });
+      for_each_place<Shape, float>(texture, places, {0, count},
+                                   [&](std::size_t k, const taps::Taps<float>& mixture) {
+                                     for (const taps::Tap<float>& tap : mixture) {
+                                       float* grad = &gradients.texels[tap.level][channels * tap.texel];
+                                       for (std::size_t c = 0; c < channels; ++c)
+                                         grad[c] += tap.weight * grad_values[channels * k + c];
+                                     }
+                                   });
     };
     if (!moves) return gradients.texels.empty() ? void() : gather();
     std::future<void> gathered;

@@ -17,11 +17,12 @@ struct TextureLookup {
     std::span<const float> texels;  ///< [height][width][channel]; of cube maps six of them
     int width, height;
   };
-  std::vector<Level> levels;  ///< the texture, and smaller versions; the first alone unless the filter is trilinear
+  std::vector<Level>
+      levels;  ///< the texture, and smaller versions; the first alone unless the filter is trilinear
   std::size_t channels;
   Border border;
   Filter filter;
-  bool is_v_up;  ///< otherwise v is 0 at row 0
+  bool is_v_up;                   ///< otherwise v is 0 at row 0
   bool is_level_rounded = false;  ///< one version is read, and not two blended
 
   std::size_t dimensions() const { return border == Border::cube ? 3 : 2; }

@@ -41,7 +41,8 @@ struct TextureMap::Access {
                map.filter_,
                !map.is_cube_} {
     for (std::size_t level = 0; level < map.levels_.size(); ++level)
-      lookup.levels.push_back({map.levels_[level], pyramid.sizes()[level].width, pyramid.sizes()[level].height});
+      lookup.levels.push_back(
+          {map.levels_[level], pyramid.sizes()[level].width, pyramid.sizes()[level].height});
   }
 
   /// Their number.
@@ -98,7 +99,8 @@ TextureMapGradient TextureMap::backward(const TexturePlaces& places,
   std::vector<std::vector<float>> by_level;
   for (const std::vector<float>& level : levels_) by_level.emplace_back(level.size());
   const std::vector<std::span<float>> levels(by_level.begin(), by_level.end());
-  look_up_backward(access.lookup, places, grad_values, {levels, found.coordinates, found.steps, found.levels});
+  look_up_backward(access.lookup, places, grad_values,
+                   {levels, found.coordinates, found.steps, found.levels});
   access.pyramid.gather(levels);
   found.texels = std::move(by_level[0]);
   return found;

@@ -58,7 +58,8 @@ void TexturePyramid::for_each_mean(std::size_t level, const Function& function) 
           for (std::size_t c = 0; c < column.weights.size(); ++c) {
             const float weight = row.weights[r] * column.weights[c];
             if (weight == 0) continue;
-            const std::size_t from = channels_ * (line * static_cast<std::size_t>(large.width) + column.first + c);
+            const std::size_t from =
+                channels_ * (line * static_cast<std::size_t>(large.width) + column.first + c);
             for (std::size_t channel = 0; channel < channels_; ++channel)
               function(to + channel, from + channel, weight);
           }
@@ -74,7 +75,8 @@ std::vector<std::vector<float>> TexturePyramid::smaller(std::span<const float> t
   std::span<const float> large = texels;
   for (std::size_t level = 1; level < sizes_.size(); ++level) {
     std::vector<float> means(count(level));
-    for_each_mean(level, [&](std::size_t to, std::size_t from, float weight) { means[to] += weight * large[from]; });
+    for_each_mean(level,
+                  [&](std::size_t to, std::size_t from, float weight) { means[to] += weight * large[from]; });
     found.push_back(std::move(means));
     large = found.back();
   }

@@ -14,9 +14,11 @@ namespace {
 class Table {
  public:
   Table(const Samples& samples, const Attributes& attributes)
-      : samples_(samples), attributes_(attributes),
+      : samples_(samples),
+        attributes_(attributes),
         of_view_(static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height)),
-        views_(samples.faces.size() / std::max<std::size_t>(of_view_ * static_cast<std::size_t>(samples.layers), 1)) {
+        views_(samples.faces.size() /
+               std::max<std::size_t>(of_view_ * static_cast<std::size_t>(samples.layers), 1)) {
     if (views_ == 0 || samples.barycentrics.size() != samples.faces.size())
       throw InvalidArgument("samples (interpolate)", std::to_string(samples.faces.size()),
                             "what Renderer::samples() returns");
@@ -26,8 +28,9 @@ class Table {
         attributes.are_of_views ? rows_of_views(attributes.values.size(), attributes.channels, "values") : 0;
     const std::size_t faces = faces_ != 0 ? faces_ : attributes.faces.size();
     const std::size_t rows = row_stride_ != 0 ? row_stride_ : attributes.values.size() / attributes.channels;
-    checks::require_numbers(attributes.values, (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
-                    "values (interpolate)");
+    checks::require_numbers(attributes.values,
+                            (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
+                            "values (interpolate)");
     for (const std::int32_t face : samples.faces)
       if (face >= 0 && static_cast<std::size_t>(face) >= faces)
         throw InvalidArgument("faces (interpolate)", std::to_string(faces),
@@ -156,9 +159,11 @@ std::vector<float> interpolate_tangent(const Samples& samples, const Attributes&
                                        std::span<const float> value_tangents,
                                        std::span<const vec2> barycentric_tangents) {
   const Table table(samples, attributes);
-  if (!value_tangents.empty()) checks::require_numbers(value_tangents, attributes.values.size(), "value_tangents (interpolate)");
+  if (!value_tangents.empty())
+    checks::require_numbers(value_tangents, attributes.values.size(), "value_tangents (interpolate)");
   if (!barycentric_tangents.empty())
-    checks::require_numbers(checks::floats_of(barycentric_tangents), 2 * table.count(), "barycentric_tangents (interpolate)");
+    checks::require_numbers(checks::floats_of(barycentric_tangents), 2 * table.count(),
+                            "barycentric_tangents (interpolate)");
   std::vector<float> found(table.count() * table.channels());
   for (std::size_t i = 0; i < table.count(); ++i) {
     if (table.is_empty(i)) continue;

@@ -255,7 +255,8 @@ std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
+                          "samples (resolve)");
   std::vector<float> pixels(channels * m.image().size());
   m.resolve(samples, channels, pixels);
   return pixels;
@@ -266,7 +267,8 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_backward");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
+                          "samples (resolve)");
   checks::require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
   return m.resolve_backward(samples, channels, grad_pixels);
 }
@@ -284,7 +286,8 @@ std::vector<float> Renderer::resolve_tangent(std::span<const float> samples, std
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_tangent");
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height, "samples (resolve)");
+  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
+                          "samples (resolve)");
   checks::require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
   m.require_tangents(directions);
   if (directions.empty()) return {};

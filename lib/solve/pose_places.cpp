@@ -53,8 +53,8 @@ glm::dvec2 tangents_at(const Scene& scene, const glm::dvec2& pixel) {
 
 /// Translations about which an object of that radius is seen all over the picture, at a distance.
 void add_places(const Scene& scene, double distance, double radius, std::vector<glm::dvec3>& places) {
-  constexpr double k_spacing = 0.75;  // of the radius
-  constexpr double k_most_places = 24;       // on a side
+  constexpr double k_spacing = 0.75;    // of the radius
+  constexpr double k_most_places = 24;  // on a side
   const glm::dvec2 low = tangents_at(scene, {0, scene.height}), high = tangents_at(scene, {scene.width, 0});
   const glm::dvec2 count = glm::clamp(glm::ceil((high - low) / (k_spacing * radius / distance)),
                                       glm::dvec2(1), glm::dvec2(k_most_places));

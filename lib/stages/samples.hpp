@@ -26,19 +26,19 @@ class SampledSurface {
 
   Buffer<cl_float4>
       places;  ///< [layer][view][height][width] barycentrics of corners 1 and 2, view depth; 0: nothing
-  Buffer<cl_uint> faces;  ///< [layer][view][height][width] of the scene, DPR_NO_FACE where nothing is
+  Buffer<cl_uint> faces;    ///< [layer][view][height][width] of the scene, DPR_NO_FACE where nothing is
   Buffer<cl_float4> steps;  ///< the same, of corners 1 and 2 to the right and down
 
   Buffer<cl_float4> moved;  ///< [direction] of places
 
   std::size_t bytes() const {
-    return places.capacity_bytes() + faces.capacity_bytes() + steps.capacity_bytes() +
-           moved.capacity_bytes();
+    return places.capacity_bytes() + faces.capacity_bytes() + steps.capacity_bytes() + moved.capacity_bytes();
   }
 
  private:
   Device::Impl& device_;
-  Launcher<kernel::samples_forward, kernel::samples_steps, kernel::samples_backward, kernel::samples_tangent> launch_;
+  Launcher<kernel::samples_forward, kernel::samples_steps, kernel::samples_backward, kernel::samples_tangent>
+      launch_;
 };
 
 }  // namespace dpr

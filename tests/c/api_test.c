@@ -942,6 +942,142 @@ static void test_frame_samples(void) {
   dpr_frame_destroy(frame);
 }
 
+/* A textured triangle that the caller shades: the frame's own image, its gradients of texels and coordinates, and
+ * <u, J v> = <J^T u, v>. */
+static void test_own_texture(void) {
+  static float pixels[FLOATS], images[SIDE * SIDE * 3], weights[FLOATS], own_weights[SIDE * SIDE * 3];
+  float view[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, -3, 0, 0, 0, 1}, intrinsics[] = {20, 20, 8.2f, 7.9f};
+  float vertices[9], coordinates[] = {-0.2f, 0.1f, 1.3f, 0.2f, 0.4f, 1.6f}, texels[4 * 3 * 3], of_view[6],
+                     of_texels[36], wanted_view[6], wanted_texels[36], moved_texels[36], moved_coordinates[6];
+  int32_t of_faces[] = {0, 1, 2};
+  const char* const settings[] = {"preset=pixel", "sigma=1e-2", "wrap=mirror", "filter=bilinear"};
+  const char* const wanted[] = {"texcoords", "textures[0]"};
+  const dpr_array arrays[] = {
+      {"vertices", vertices, DPR_FLOAT32, 2, {3, 3}},     {"faces", of_faces, DPR_INT32, 2, {1, 3}},
+      {"views", view, DPR_FLOAT32, 3, {1, 4, 4}},         {"intrinsics", intrinsics, DPR_FLOAT32, 2, {1, 4}},
+      {"texcoords", coordinates, DPR_FLOAT32, 2, {3, 2}}, {"textures[0]", texels, DPR_FLOAT32, 3, {4, 3, 3}}};
+  const dpr_array image = {"image", pixels, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array grad = {"image", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array of_image[] = {{"texcoords", wanted_view, DPR_FLOAT32, 2, {3, 2}},
+                                {"textures[0]", wanted_texels, DPR_FLOAT32, 3, {4, 3, 3}}};
+  const dpr_array resolved = {"images", images, DPR_FLOAT32, 4, {1, SIDE, SIDE, 3}};
+  const dpr_array grad_resolved = {"grad_images", own_weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 3}};
+  dpr_frame_options options = DPR_FRAME_OPTIONS_INIT;
+  dpr_raster raster;
+  dpr_frame* frame = NULL;
+  size_t count, k;
+  memcpy(vertices, positions, sizeof vertices);
+  for (k = 0; k < 36; ++k) texels[k] = 0.5f + 0.5f * sinf((float)k), moved_texels[k] = cosf((float)k);
+  for (k = 0; k < 6; ++k) moved_coordinates[k] = cosf(2.0f * (float)k);
+  for (k = 0; k < SIDE * SIDE; ++k) {
+    size_t c;
+    for (c = 0; c < 3; ++c) weights[4 * k + c] = own_weights[3 * k + c] = sinf(0.7f * (float)(4 * k + c));
+    weights[4 * k + 3] = 0;
+  }
+  options.width = options.height = SIDE;
+  options.settings = settings, options.setting_count = 4;
+  options.gradients = wanted, options.gradient_count = 2;
+  OK(dpr_frame_render(&options, arrays, 6, &frame));
+  OK(dpr_frame_read(frame, &image, 1));
+  OK(dpr_frame_backward(frame, &grad, 1, of_image, 2));
+  OK(dpr_frame_raster(frame, &raster));
+  count = (size_t)raster.width * (size_t)raster.height;
+  {
+    const size_t h = (size_t)raster.height, w = (size_t)raster.width;
+    int64_t* const face_id = malloc(count * sizeof *face_id);
+    float *const numbers = malloc(30 * count * sizeof(float)), *const barycentrics = numbers,
+                 *const barycentric_steps = numbers + 3 * count, *const uv = numbers + 7 * count,
+                 *const steps = numbers + 9 * count, *const values = numbers + 13 * count,
+                 *const grad_values = numbers + 16 * count, *const grad_uv = numbers + 19 * count,
+                 *const moved_uv = numbers + 21 * count, *const moved_values = numbers + 23 * count,
+                 *const grad_barycentrics = numbers + 26 * count;
+    const dpr_array samples[] = {{"face_id", face_id, DPR_INT64, 3, {1, h, w}},
+                                 {"barycentrics", barycentrics, DPR_FLOAT32, 4, {1, h, w, 3}},
+                                 {"barycentric_steps", barycentric_steps, DPR_FLOAT32, 4, {1, h, w, 4}},
+                                 {"attributes", coordinates, DPR_FLOAT32, 2, {3, 2}},
+                                 {"faces", of_faces, DPR_INT32, 2, {1, 3}}};
+    const dpr_array outputs[] = {{"values", uv, DPR_FLOAT32, 4, {1, h, w, 2}},
+                                 {"steps", steps, DPR_FLOAT32, 4, {1, h, w, 4}}};
+    const dpr_array grad_outputs[] = {{"values", grad_uv, DPR_FLOAT32, 4, {1, h, w, 2}}};
+    const dpr_array of_samples[] = {{"attributes", of_view, DPR_FLOAT32, 2, {3, 2}},
+                                    {"barycentrics", grad_barycentrics, DPR_FLOAT32, 4, {1, h, w, 3}}};
+    const dpr_array moving[] = {{"attributes", moved_coordinates, DPR_FLOAT32, 2, {3, 2}}};
+    const dpr_array uv_moved = {"values", moved_uv, DPR_FLOAT32, 4, {1, h, w, 2}};
+    const dpr_array map[] = {{"texels[0]", texels, DPR_FLOAT32, 4, {1, 4, 3, 3}},
+                             {"texcoords", uv, DPR_FLOAT32, 4, {1, h, w, 2}},
+                             {"steps", steps, DPR_FLOAT32, 4, {1, h, w, 4}}};
+    const dpr_array of_map[] = {{"texels[0]", of_texels, DPR_FLOAT32, 4, {1, 4, 3, 3}},
+                                {"texcoords", grad_uv, DPR_FLOAT32, 4, {1, h, w, 2}}};
+    const dpr_array map_moved[] = {{"texels[0]", moved_texels, DPR_FLOAT32, 4, {1, 4, 3, 3}},
+                                   {"texcoords", moved_uv, DPR_FLOAT32, 4, {1, h, w, 2}}};
+    const dpr_array shaded = {"values", values, DPR_FLOAT32, 4, {1, h, w, 3}};
+    const dpr_array grad_shaded = {"values", grad_values, DPR_FLOAT32, 4, {1, h, w, 3}};
+    const dpr_array values_moved = {"values", moved_values, DPR_FLOAT32, 4, {1, h, w, 3}};
+    dpr_array wrong[3];
+    double forward = 0, size = 0, backward = 0;
+    OK(dpr_frame_samples(frame, samples, 3));
+    OK(dpr_interpolate(samples, 5, outputs, 2));
+    OK(dpr_texture_map(map, 2, "mirror", "bilinear", &shaded));
+    for (k = 0; k < 3 * count; ++k) values[k] = face_id[k / 3] < 0 ? 0 : values[k];
+    OK(dpr_frame_resolve(frame, &shaded, &resolved));
+    for (k = 0; k < SIDE * SIDE * 3; ++k) EXPECT(fabsf(images[k] - pixels[k / 3 * 4 + k % 3]) < 1e-5f);
+    OK(dpr_frame_resolve_backward(frame, &shaded, &grad_resolved, &grad_shaded, NULL, 0));
+    for (k = 0; k < 3 * count; ++k) grad_values[k] = face_id[k / 3] < 0 ? 0 : grad_values[k];
+    OK(dpr_texture_map_backward(map, 2, "mirror", NULL, &grad_shaded, of_map, 2));
+    OK(dpr_interpolate_backward(samples, 5, grad_outputs, 1, of_samples, 2));
+    for (k = 0; k < 36; ++k) EXPECT(fabsf(of_texels[k] - wanted_texels[k]) < 1e-4f);
+    for (k = 0; k < 6; ++k) EXPECT(fabsf(of_view[k] - wanted_view[k]) < 1e-3f);
+
+    OK(dpr_interpolate_tangent(samples, 5, moving, 1, &uv_moved));
+    OK(dpr_texture_map_tangent(map, 2, "mirror", "bilinear", map_moved, 2, &values_moved));
+    for (k = 0; k < 3 * count; ++k) {
+      const double term = (double)grad_values[k] * (double)moved_values[k];
+      forward += term, size += fabs(term);
+    }
+    for (k = 0; k < 36; ++k) backward += (double)of_texels[k] * (double)moved_texels[k];
+    for (k = 0; k < 6; ++k) backward += (double)of_view[k] * (double)moved_coordinates[k];
+    EXPECT(size > 1 && fabs(forward - backward) < 1e-5 * size);
+
+    /* Smaller versions, made here or given. */
+    OK(dpr_texture_map(map, 3, "mirror", "trilinear", &shaded));
+    memcpy(moved_values, values, 3 * count * sizeof(float));
+    for (k = 0; k < 4 * count; ++k) steps[k] *= 100;
+    OK(dpr_texture_map(map, 3, "mirror", "trilinear", &shaded)); /* a mean of all texels */
+    for (k = 0; k < 3 * count; ++k) {
+      float mean = 0;
+      size_t i;
+      if (face_id[k / 3] < 0) continue;
+      for (i = 0; i < 12; ++i) mean += texels[3 * i + k % 3] / 12;
+      EXPECT(fabsf(values[k] - mean) < 1e-5f);
+      backward += fabs((double)(moved_values[k] - mean));
+    }
+    EXPECT(backward > 1);
+
+    memcpy(wrong, map, sizeof wrong);
+    wrong[0].shape[0] = 2;
+    REFUSED(dpr_texture_map(wrong, 2, NULL, NULL, &shaded), "texels[0]");
+    REFUSED(dpr_texture_map(map, 2, "round", NULL, &shaded), "repeat, mirror, clamp or zero");
+    REFUSED(dpr_texture_map(map, 2, NULL, "cubic", &shaded), "trilinear");
+    REFUSED(dpr_texture_map(map, 1, NULL, NULL, &shaded), "texcoords, places or directions");
+    REFUSED(dpr_texture_map(map + 1, 2, NULL, NULL, &shaded), "texels[0]");
+    REFUSED(dpr_texture_map(map, 2, NULL, NULL, &outputs[0]), "values");
+    REFUSED(dpr_texture_map(samples, 5, NULL, NULL, &shaded), "name (texture)");
+    REFUSED(dpr_texture_map_backward(map, 2, NULL, NULL, &grad_shaded, samples, 1), "face_id");
+    memcpy(wrong, map, sizeof wrong);
+    wrong[2] = map[0], wrong[2].name = "texels[2]";
+    REFUSED(dpr_texture_map(wrong, 3, NULL, "trilinear", &shaded), "texels[2]");
+    uv[0] = NAN;
+    REFUSED(dpr_texture_map(map, 2, NULL, NULL, &shaded), "texcoords");
+    REFUSED(dpr_interpolate(samples, 4, outputs, 1), "faces");
+    REFUSED(dpr_interpolate(samples, 5, samples, 1), "values or steps");
+    face_id[0] = 1;
+    REFUSED(dpr_interpolate(samples, 5, outputs, 1), "face 1");
+    REFUSED(dpr_interpolate_backward(samples, 5, NULL, 1, of_samples, 1), "grads");
+    free(face_id), free(numbers);
+  }
+  dpr_frame_destroy(frame);
+}
+
 /* A triangle by its positions in clip space, under z = 1.2 w - 2.2: a frame's image and gradient, and those of a step. */
 static void test_clip_space(void) {
   static float pixels[FLOATS], moved[FLOATS], weights[FLOATS];
@@ -1774,6 +1910,7 @@ int main(void) {
   test_image_files();
   test_frame_samples();
   test_frame_layers();
+  test_own_texture();
   test_clip_space();
   test_setters(device);
   test_mesh_loss(device, scene);

@@ -39,9 +39,8 @@ reference::Texture to_reference(const Texture& texture) {
 }
 
 double dot(std::span<const float> a, std::span<const float> b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(), [](float x, float y) {
-    return static_cast<double>(x) * static_cast<double>(y);
-  });
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(),
+                            [](float x, float y) { return static_cast<double>(x) * static_cast<double>(y); });
 }
 
 double size_of(std::span<const float> a) { return std::sqrt(dot(a, a)); }
@@ -89,7 +88,8 @@ Places places_in_texels(std::size_t count) {
   Places places;
   for (std::size_t i = 0; i < count; ++i) {
     for (const int size : {k_width, k_height})
-      places.coordinates.push_back((std::floor(random(-7, 14)) + random(0.6F, 0.9F)) / static_cast<float>(size));
+      places.coordinates.push_back((std::floor(random(-7, 14)) + random(0.6F, 0.9F)) /
+                                   static_cast<float>(size));
   }
   places.steps = drawn(4 * count, -0.3F, 0.3F, 6);
   places.levels = drawn(count, -0.2F, 0.2F, 7);
@@ -155,7 +155,8 @@ TEST_SUITE("unit") {
         for (std::size_t i = 0; i < levels.size(); ++i) {
           const reference::Vec2d uv{coordinates[2 * i], coordinates[2 * i + 1]};
           const double level = filter == Filter::trilinear ? static_cast<double>(levels[i]) : 0.0;
-          const reference::Vec3d rgb = sample_pyramid(expected, uv, level), a = sample_pyramid(alpha, uv, level);
+          const reference::Vec3d rgb = sample_pyramid(expected, uv, level),
+                                 a = sample_pyramid(alpha, uv, level);
           const std::array<double, 4> wanted{rgb.x, rgb.y, rgb.z, a.x};
           for (std::size_t c = 0; c < 4; ++c)
             worst = std::max(worst, std::abs(static_cast<double>(values[4 * i + c]) - wanted[c]));
@@ -173,14 +174,14 @@ TEST_SUITE("unit") {
     const std::vector<float> coordinates = drawn(120, 0, 1, 1), steps = drawn(240, -0.3F, 0.3F, 2),
                              more = drawn(60, -1, 1, 3);
     for (const bool has_levels : {false, true}) {
-      const std::vector<float> values =
-          map.values({coordinates, steps, has_levels ? std::span<const float>(more) : std::span<const float>()});
+      const std::vector<float> values = map.values(
+          {coordinates, steps, has_levels ? std::span<const float>(more) : std::span<const float>()});
       double worst = 0;
       for (std::size_t i = 0; i < more.size(); ++i) {
         const double level = std::log2(longest(std::span(steps).subspan(4 * i, 4), 16, 8)) +
                              (has_levels ? static_cast<double>(more[i]) : 0);
-        const reference::Vec3d wanted =
-            sample_pyramid(to_reference(texture), {coordinates[2 * i], coordinates[2 * i + 1]}, std::max(level, 0.0));
+        const reference::Vec3d wanted = sample_pyramid(
+            to_reference(texture), {coordinates[2 * i], coordinates[2 * i + 1]}, std::max(level, 0.0));
         worst = std::max(worst, std::abs(static_cast<double>(values[3 * i]) - wanted.x));
       }
       CHECK(worst < 2e-5);
@@ -205,7 +206,7 @@ TEST_SUITE("unit") {
       for (int i = 0; i < 400; ++i) {
         glm::vec3 d = random.vector(-1, 1);
         if (i % 2 == 0) d /= std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
-        if (i % 4 == 0) d[i / 4 % 3] = 0.995F;  // by an edge
+        if (i % 4 == 0) d[i / 4 % 3] = 0.995F;                                     // by an edge
         if (i % 8 == 0) d = glm::sign(d) * (1.0F + 0.01F * random.vector(-1, 1));  // by a corner
         for (int k = 0; k < 3; ++k) directions.push_back(d[k]);
       }
@@ -233,20 +234,24 @@ TEST_SUITE("unit") {
         check_derivatives(make, texels, {at.coordinates, {}, {}});
         if (filter != Filter::trilinear) continue;
         check_derivatives(make, texels, {at.coordinates, {}, drawn(60, 0.2F, 0.8F, 8)});
-        check_derivatives(make, texels, {at.coordinates, drawn(240, 0.02F, 0.05F, 8), drawn(60, 1.2F, 1.4F, 8)});
+        check_derivatives(make, texels,
+                          {at.coordinates, drawn(240, 0.02F, 0.05F, 8), drawn(60, 1.2F, 1.4F, 8)});
       }
     }
     constexpr int k_side = 4;
     check::Random random(2);
     Places directions{{}, drawn(60 * 6, -0.1F, 0.1F, 3), drawn(60, 0.9F, 1.1F, 4)};
     for (int i = 0; i < 60; ++i) {  // within a texel
-      glm::vec3 d{1, (std::floor(random(-2, 2)) + random(0.6F, 0.9F)) / 2, (std::floor(random(-2, 2)) + random(0.6F, 0.9F)) / 2};
+      glm::vec3 d{1, (std::floor(random(-2, 2)) + random(0.6F, 0.9F)) / 2,
+                  (std::floor(random(-2, 2)) + random(0.6F, 0.9F)) / 2};
       d = random(0.5F, 2) * (i % 2 == 0 ? d : glm::vec3(d.y, d.z, -1));
       for (int k = 0; k < 3; ++k) directions.coordinates.push_back(d[k]);
     }
     for (const Filter filter : {Filter::nearest, Filter::bilinear, Filter::trilinear}) {
       CAPTURE(static_cast<int>(filter));
-      const auto make = [&](std::vector<float> from) { return TextureMap::cube(std::move(from), k_side, filter); };
+      const auto make = [&](std::vector<float> from) {
+        return TextureMap::cube(std::move(from), k_side, filter);
+      };
       const std::vector<float> of_cube = drawn(6 * k_side * k_side, 0, 1, 9);
       check_derivatives(make, of_cube, {directions.coordinates, {}, {}});
       if (filter == Filter::trilinear) check_derivatives(make, of_cube, directions);
@@ -264,9 +269,11 @@ TEST_SUITE("unit") {
     const std::vector<float> odd(3), bad{0, std::numeric_limits<float>::infinity()}, good(2);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.values({.coordinates = odd}), "coordinates (texture map)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.values({.coordinates = bad}), "coordinates (texture map)");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.values({.coordinates = good, .steps = odd}), "steps (texture map)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.values({.coordinates = good, .steps = odd}),
+                          "steps (texture map)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.backward({.coordinates = good}, odd), "grad_values");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.tangent({.coordinates = good}, {.coordinates = odd}), "tangents");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, map.tangent({.coordinates = good}, {.coordinates = odd}),
+                          "tangents");
     CHECK(map.values({}).empty());
   }
 }

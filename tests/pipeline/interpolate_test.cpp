@@ -30,9 +30,8 @@ std::vector<float> drawn(std::size_t count, unsigned seed) {
 }
 
 double dot(std::span<const float> a, std::span<const float> b) {
-  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(), [](float x, float y) {
-    return static_cast<double>(x) * static_cast<double>(y);
-  });
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0, std::plus<>(),
+                            [](float x, float y) { return static_cast<double>(x) * static_cast<double>(y); });
 }
 
 std::span<const float> numbers_of(const std::vector<glm::vec2>& vectors) {
@@ -98,7 +97,8 @@ TEST_SUITE("pipeline") {
     std::vector<float> colors = texture.values({.coordinates = uv});
     const auto without_background = [&](std::vector<float>& of_colors) {
       for (std::size_t i = 0; i < samples.faces.size(); ++i)
-        if (samples.faces[i] < 0) std::fill_n(of_colors.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, 0.0F);
+        if (samples.faces[i] < 0)
+          std::fill_n(of_colors.begin() + static_cast<std::ptrdiff_t>(3 * i), 3, 0.0F);
     };
     without_background(colors);
     const std::vector<float> image = renderer.resolve(colors, 3);
@@ -144,7 +144,8 @@ TEST_SUITE("pipeline") {
       }
       for (const bool is_down : {false, true}) {
         const std::size_t step = is_down ? width : 1;
-        if (samples.faces[i - step] != samples.faces[i] || samples.faces[i + step] != samples.faces[i]) continue;
+        if (samples.faces[i - step] != samples.faces[i] || samples.faces[i + step] != samples.faces[i])
+          continue;
         // Over the depth they and 1 are linear on the screen.
         const auto over_depth = [&](std::size_t at) {
           return glm::dvec3(glm::vec3(samples.barycentrics[at], 1)) / static_cast<double>(samples.depths[at]);
@@ -168,7 +169,8 @@ TEST_SUITE("pipeline") {
     const std::vector<float> places = interpolate(samples, {mesh.faces, values, 3});
     double largest = 0, error = 0;
     for (std::size_t i = 1; i + 1 < samples.faces.size(); ++i) {
-      if (samples.faces[i] < 0 || samples.faces[i - 1] != samples.faces[i] || samples.faces[i + 1] != samples.faces[i])
+      if (samples.faces[i] < 0 || samples.faces[i - 1] != samples.faces[i] ||
+          samples.faces[i + 1] != samples.faces[i])
         continue;
       for (std::size_t c = 0; c < 3; ++c) {
         const double change = 0.5 * static_cast<double>(places[3 * (i + 1) + c] - places[3 * (i - 1) + c]);
@@ -200,11 +202,13 @@ TEST_SUITE("pipeline") {
                                moves = drawn(values.size(), 4);
       check::Random random(5);
       std::vector<vec2> barycentrics;
-      for (std::size_t i = 0; i < samples.faces.size(); ++i) barycentrics.emplace_back(random(-1, 1), random(-1, 1));
+      for (std::size_t i = 0; i < samples.faces.size(); ++i)
+        barycentrics.emplace_back(random(-1, 1), random(-1, 1));
       const InterpolateGradient inside = interpolate_backward(samples, attributes, grad);
       const std::vector<float> tangent = interpolate_tangent(samples, attributes, moves, barycentrics);
       const double forward = dot(grad, tangent),
-                   backward = dot(inside.values, moves) + dot(numbers_of(inside.barycentrics), numbers_of(barycentrics));
+                   backward = dot(inside.values, moves) +
+                              dot(numbers_of(inside.barycentrics), numbers_of(barycentrics));
       CHECK(std::abs(forward - backward) < 1e-5 * std::sqrt(dot(grad, grad) * dot(tangent, tangent)));
       // Steps are linear in the attributes.
       const InterpolateGradient with_steps = interpolate_backward(samples, attributes, grad, grad_steps);
@@ -218,7 +222,8 @@ TEST_SUITE("pipeline") {
       const auto of_view = static_cast<std::size_t>(5 * samples.width * samples.height);
       CHECK(std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(of_view), changed.begin()));
       CHECK(std::ranges::any_of(std::span(found).subspan(of_view, of_view), [](float v) { return v != 0; }));
-      CHECK(std::ranges::all_of(std::span(changed).subspan(of_view, of_view), [](float v) { return v == 0; }));
+      CHECK(
+          std::ranges::all_of(std::span(changed).subspan(of_view, of_view), [](float v) { return v == 0; }));
     }
   }
 
@@ -230,15 +235,20 @@ TEST_SUITE("pipeline") {
     const std::vector<uvec3> faces{{0, 1, 2}, {2, 1, 0}}, beyond{{0, 1, 2}, {2, 1, 3}};
     const std::vector<float> values{1, 2, 3}, bad{1, 2, NAN};
     CHECK(interpolate(samples, {faces, values, 1})[0] == doctest::Approx(0.5 * 3 + 0.2 * 2 + 0.3));
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {beyond, values, 1}), "faces[1] (interpolate): got 3");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {std::span(faces).first(1), values, 1}), "face 1");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {beyond, values, 1}),
+                          "faces[1] (interpolate): got 3");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {std::span(faces).first(1), values, 1}),
+                          "face 1");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 2}), "values (interpolate)");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 0}), "channels (interpolate)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 0}),
+                          "channels (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, bad, 1}), "values (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate({}, {faces, values, 1}), "samples (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_steps(samples, {faces, values, 1}), "no steps");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_backward(samples, {faces, values, 1}, {}), "grad_values");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_tangent(samples, {faces, values, 1}, bad, {}), "value_tangents");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_backward(samples, {faces, values, 1}, {}),
+                          "grad_values");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_tangent(samples, {faces, values, 1}, bad, {}),
+                          "value_tangents");
   }
 }
 

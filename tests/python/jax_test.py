@@ -230,6 +230,23 @@ class JaxTest(unittest.TestCase):
         with self.assertRaisesRegex(Exception, r"\(dpr.rasterize\).* expected .*V, 3"):
             dpr.rasterize(jnp.asarray(TETRAHEDRON)[:, 0], FACES, views, intrinsics, width=SIZE, height=SIZE)
 
+    def test_textures(self):
+        random = np.random.default_rng(3)
+        texels, uv = random.random((6, 5, 2), np.float32), 3 * random.random((2, 4, 5, 2), np.float32) - 1
+        values, pullback = dpr.texture_with_vjp(texels, uv, wrap="mirror")
+        weights, moves = random.random(values.shape, np.float32), [random.random(a.shape, np.float32) for a in (texels, uv)]
+        wanted = pullback(weights)
+
+        def loss(texels, uv):
+            return (dpr.texture(texels, uv, wrap="mirror") * weights).sum()
+
+        found = jax.jit(jax.grad(loss, (0, 1)))(texels, uv)
+        for gradient, name in zip(found, ("texels", "texcoords")):
+            np.testing.assert_allclose(gradient, wanted[name], atol=1e-5)
+        tangent = jax.jvp(loss, (jax.numpy.asarray(texels), jax.numpy.asarray(uv)), tuple(moves))[1]
+        backward = sum((wanted[name] * move).sum() for name, move in zip(("texels", "texcoords"), moves))
+        self.assertLess(abs(tangent - backward), 1e-4 * abs(backward))
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -7,7 +7,7 @@ import numpy as np
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from . import _arrays, _frames, _samples
+from . import _arrays, _frames, _rasterized, _texture_maps
 
 
 # Three kinds of pass from a call's arrays to outputs. Before one runs, JAX asks for the outputs' shapes, and which have
@@ -31,12 +31,12 @@ class _Images(_frames.Rendered):
                           for i in self.differentiable(self.spec)[1:])]
 
 
-class _Layers(_samples.Rasterized):
+class _Layers(_rasterized.Rasterized):
     """(arrays of a call) to face_id, barycentrics and depth, for shading of the caller's own."""
 
     @staticmethod
     def shapes(spec, arrays):
-        raster = _samples.raster_of(spec)
+        raster = _rasterized.raster_of(spec)
         size = (raster.layers, _view_count(spec, arrays), raster.height, raster.width)
         return [(size, np.int64), ((*size, 3), np.float32), (size, np.float32)]
 
@@ -45,7 +45,7 @@ class _Layers(_samples.Rasterized):
         return [1, 2]
 
 
-class _Resolved(_samples.Rasterized):
+class _Resolved(_rasterized.Rasterized):
     """(arrays of a call, values of its samples) to images."""
 
     def __init__(self, spec, arrays, wanted):
@@ -203,7 +203,7 @@ class _Traced:
     """What Samples need of a frame that is yet to come."""
 
     def __init__(self, spec):
-        self.spec, self.raster, self.warning = spec, _samples.raster_of(spec), None
+        self.spec, self.raster, self.warning = spec, _rasterized.raster_of(spec), None
 
 
 def rasterize(spec, leaves):
@@ -217,3 +217,7 @@ def resolve(traced, values, leaves):
     if values.ndim != 4 or values.shape[:3] != size or not values.size:
         _arrays.fail(ValueError, "values", list(values.shape), f"[{', '.join(map(str, size))}, C]", "dpr.Samples")
     return _run(_Resolved, traced.spec, [*leaves, jax.numpy.asarray(values, np.float32)])[0]
+
+
+def texture(lookup, arrays):
+    return _run(_texture_maps.Read, lookup, [jax.numpy.asarray(array) for array in arrays])[0]

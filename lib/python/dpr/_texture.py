@@ -1,11 +1,11 @@
-"""Textures of dpr.nvdiffrast."""
+"""Textures of PyTorch, and those of dpr.nvdiffrast."""
 from typing import List, Optional, Sequence, Union
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from . import _arrays, _frames, _library, _torch
+from . import _arrays, _torch
+from ._texture_maps import Lookup, Read
 
 # In the library's words.
 _FILTERS = {"nearest": "nearest", "linear": "bilinear", "linear-mipmap-nearest": "mipmap", "linear-mipmap-linear": "trilinear"}
@@ -68,35 +68,14 @@ def texture_construct_mip(tex: Tensor, max_mip_level: Optional[int] = None, cube
     return Mip(_smaller(tex, max_mip_level), cube_mode)
 
 
-def _one(array):
-    return _frames.c_arrays([("values", array)])[0]
-
-
-class _Lookup:
-    """A call's words and the names of its tensors, as the library has them."""
-
-    def __init__(self, names, wrap, filter_mode):
-        self.names, self.words = names, (wrap.encode(), filter_mode.encode())
-
-    def arrays(self, tensors):
-        return _frames.c_arrays(list(zip(self.names, map(_packed, tensors))))
-
-
-def _packed(tensor):
-    return np.ascontiguousarray(_arrays.to_numpy(tensor))
-
-
 @_torch.one_forward
 class _Gradients(_torch.Derivative):
     """(gradient of the values, all tensors) to those of the tensors with these numbers."""
 
     @staticmethod
     def forward(lookup, numbers, grad_values, *tensors):
-        kept, grad = list(map(_packed, tensors)), _packed(grad_values)
-        found = [np.empty(kept[i].shape, np.float32) for i in numbers]
-        named = [(lookup.names[i], array) for i, array in zip(numbers, found)]
-        _library.call("dpr_texture_map_backward", *lookup.arrays(kept), *lookup.words, _one(grad), *_frames.c_arrays(named))
-        return tuple(map(torch.from_numpy, found))
+        found = Read(lookup, list(map(_arrays.to_numpy, tensors)), numbers).gradients([_arrays.to_numpy(grad_values)])
+        return tuple(torch.from_numpy(found[i]) for i in numbers)
 
 
 @_torch.one_forward
@@ -104,42 +83,42 @@ class _Tangents(_torch.Derivative):
     """(tangents of the tensors with these numbers, all tensors) to that of the values."""
 
     @staticmethod
-    def forward(lookup, numbers, channels, *tensors):
-        moving, kept = (list(map(_packed, part)) for part in (tensors[:len(numbers)], tensors[len(numbers):]))
-        found = np.empty((*kept[0].shape[:3], channels), np.float32)
-        named = [(lookup.names[i], array) for i, array in zip(numbers, moving)]
-        _library.call("dpr_texture_map_tangent", *lookup.arrays(kept), *lookup.words, *_frames.c_arrays(named), _one(found))
-        return torch.from_numpy(found)
+    def forward(lookup, numbers, *tensors):
+        arrays = list(map(_arrays.to_numpy, tensors))
+        moving = {i: tangent[None] for i, tangent in zip(numbers, arrays)}
+        return torch.from_numpy(Read(lookup, arrays[len(numbers):]).tangents(moving)[0][0])
 
 
 @_torch.one_forward
 class _Texture(torch.autograd.Function):
-    """(coordinates and what else the library reads, texels among it) to values."""
+    """(tensors of a lookup) to values."""
 
     @staticmethod
     def forward(lookup, *tensors):
-        kept = list(map(_packed, tensors))
-        found = np.empty((*kept[0].shape[:3], kept[-1].shape[-1]), np.float32)
-        _library.call("dpr_texture_map", *lookup.arrays(kept), *lookup.words, _one(found))
-        return torch.from_numpy(found)
+        return torch.from_numpy(Read(lookup, list(map(_arrays.to_numpy, tensors))).outputs[0])
 
     @staticmethod
     def setup_context(ctx, inputs, outputs):
         ctx.lookup, *tensors = inputs
-        ctx.channels = outputs.shape[-1]
         ctx.save_for_backward(*tensors)
         ctx.save_for_forward(*tensors)
 
     @staticmethod
     def backward(ctx, grad_values):
-        numbers = [i for i, wanted in enumerate(ctx.needs_input_grad[1:]) if wanted]
+        numbers = tuple(i for i, wanted in enumerate(ctx.needs_input_grad[1:]) if wanted)
         found = dict(zip(numbers, _Gradients.apply(ctx.lookup, numbers, grad_values, *ctx.saved_tensors)))
         return (None, *(found.get(i) for i in range(len(ctx.saved_tensors))))
 
     @staticmethod
     def jvp(ctx, _, *tangents):
-        numbers = [i for i, tangent in enumerate(tangents) if tangent is not None]
-        return _Tangents.apply(ctx.lookup, numbers, ctx.channels, *(tangents[i] for i in numbers), *ctx.saved_tensors)
+        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        return _Tangents.apply(ctx.lookup, numbers, *(tangents[i] for i in numbers), *ctx.saved_tensors)
+
+
+def read(lookup, arrays):
+    """A lookup's values; differentiable."""
+    tensors = [array if isinstance(array, Tensor) else torch.from_dlpack(_arrays.to_numpy(array)) for array in arrays]
+    return _Texture.apply(lookup, *tensors)
 
 
 def _levels(tex, mip, most, is_cube):
@@ -206,6 +185,6 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
     if is_mipmap:
         given.update({name: array for name, array in (("steps", uv_da), ("levels", mip_level_bias)) if array is not None})
     tensors = [torch.nan_to_num(array, 0.0, 0.0, 0.0) for array in given.values()]
-    names = [*given, *(f"texels[{i}]" for i in range(len(levels)))]
-    lookup = _Lookup(names, _BOUNDARIES[boundary_mode], _FILTERS[filter_mode])
-    return _Texture.apply(lookup, *tensors, *(level.flatten(0, -4) for level in levels))
+    names = (*given, *(f"texels[{i}]" for i in range(len(levels))))
+    lookup = Lookup(names, _BOUNDARIES[boundary_mode], _FILTERS[filter_mode])
+    return read(lookup, [*tensors, *(level.flatten(0, -4) for level in levels)])

@@ -9,7 +9,7 @@ from torch.autograd import forward_ad
 
 from . import _arrays, _frames
 from ._frames import Rendered, Spec
-from ._samples import Rasterized
+from ._rasterized import Rasterized
 
 _COMPILES = hasattr(torch.library, "register_autograd")  # from 2.4 on
 _HAS_CONTEXT = hasattr(torch.autograd.Function, "setup_context")  # from 2.0 on, for torch.func

@@ -1,0 +1,178 @@
+"""Frames for shading of the caller's own: what their samples show, and images of values that the caller finds for them."""
+from __future__ import annotations
+
+import ctypes
+import functools
+
+import numpy as np
+
+from . import _arrays, _frames, _library, _merged
+
+_NAMES = ("face_id", "barycentrics", "depth")
+
+
+class Rasterized:
+    """A frame, and what its samples show."""
+
+    @_arrays.named("dpr.rasterize")
+    def __init__(self, spec, arrays, wanted):
+        """arrays, wanted: as Rendered has them."""
+        arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
+        self.leaves, self._shapes = wanted, [array.shape for array in arrays]
+        self._lot, self._frame = _rendered(spec, arrays, wanted)
+        # Of a frame that shows nothing.
+        self.warning = _frames.NOTHING_RENDERED if self._frame.is_empty() else None
+        self.raster = _library.Raster()
+        _library.call("dpr_frame_raster", self._frame.handle, ctypes.byref(self.raster))
+        count = len(dict(self._lot.named)["views"])
+        self.size, self._image_size = (count, self.raster.height, self.raster.width), (count, spec.height, spec.width)
+
+    @functools.cached_property
+    def steps(self):
+        """[layer, view, h, w, 3, 2]: how fast barycentrics change from sample to sample to the right and down."""
+        found = np.empty((self.raster.layers, *self.size, 2, 2), np.float32)
+        _library.call("dpr_frame_samples", self._frame.handle,
+                      *_of_layers([("barycentric_steps", found.reshape(*found.shape[:4], 4))]))
+        return np.concatenate([-found.sum(-2, keepdims=True), found], -2)
+
+    @property
+    def _output_shapes(self):
+        size = (self.raster.layers, *self.size)
+        return size, (*size, 3), size
+
+    @functools.cached_property
+    def outputs(self):
+        """[face_id, barycentrics, depth], each [layer, view, ...]"""
+        found = [np.empty(shape, kind) for shape, kind in zip(self._output_shapes, (np.int64, np.float32, np.float32))]
+        _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, found)))
+        return found
+
+    def _gradients(self, function, *arguments):
+        """{leaf: gradient} that a function of the library computes."""
+        totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in self.leaves}
+        found = self._lot.gradients(totals)
+        _library.call(function, self._frame.handle, *arguments, *_frames.c_arrays(found))
+        self._lot.add(found, totals)
+        return totals
+
+    def gradients(self, grads):
+        """{leaf: gradient} of sum <grad, output>, of the outputs whose grad is not None."""
+        named = [(name, np.ascontiguousarray(_arrays.to_numpy(grad), np.float32)) for name, grad in zip(_NAMES, grads)
+                 if grad is not None]
+        return self._gradients("dpr_frame_samples_backward", *_of_layers(named))
+
+    def gradients_of_layer(self, layer, grads):
+        """The same by the outputs of one layer."""
+        whole = [None if grad is None else np.zeros(shape, np.float32) for grad, shape in zip(grads, self._output_shapes)]
+        for name, grad, of_all in zip(_NAMES, grads, whole):
+            if grad is not None:
+                of_all[layer] = _checked(name, grad, of_all.shape[1:])
+        return self.gradients(whole)
+
+    def resolve(self, values):
+        values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim == 4 else 0))
+        images = np.empty((*self._image_size, values.shape[-1]), np.float32)
+        _library.call("dpr_frame_resolve", self._frame.handle, _one("values", values), _one("images", images))
+        return images
+
+    def resolve_gradients(self, values, grad_images):
+        """(gradient of the values, {leaf: gradient})"""
+        values = _checked("values", values, (*self.size, values.shape[-1]))
+        grad_images = _checked("grad_images", grad_images, (*self._image_size, values.shape[-1]))
+        grad_values = np.empty(values.shape, np.float32)
+        found = self._gradients("dpr_frame_resolve_backward", _one("values", values), _one("grad_images", grad_images),
+                                _one("grad_values", grad_values))
+        return grad_values, found
+
+    def tangents(self, given):
+        """Tangents [K, *output.shape] of barycentrics and depth along {leaf: [K, ...]} of arrays that were wanted."""
+        count = len(next(iter(given.values())))
+        found = [np.empty((count, *shape), np.float32) for shape in self._output_shapes[1:]]
+        rows = [(name, array.reshape(-1, *array.shape[3:])) for name, array in zip(_NAMES[1:], found)]
+        moving = self._moving(count, given)
+        _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
+                      *_frames.c_arrays(rows))
+        return found
+
+    def resolve_tangents(self, count, values, value_tangents, given):
+        """Tangents [count, N, height, width, C] of resolve(values), along {leaf: [count, ...]} of arrays that were wanted.
+        value_tangents: [count, *values.shape], or None where the values stay."""
+        values = _checked("values", values, (*self.size, values.shape[-1]))
+        moved = np.zeros((count, *values.shape), np.float32) if value_tangents is None else \
+            _checked("tangents of values", value_tangents, (count, *values.shape))
+        images = np.empty((count, *self._image_size, values.shape[-1]), np.float32)
+        moving = self._moving(count, given)
+        _library.call("dpr_frame_resolve_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
+                      _one("values", values), _one("value_tangents", moved.reshape(-1, *values.shape[1:])),
+                      _one("images", images.reshape(-1, *images.shape[2:])))
+        return images
+
+    def _moving(self, count, given):
+        """The frame's arrays of tangents, to keep while the library reads them."""
+        return self._lot.tangents({leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}, count)
+
+
+@functools.lru_cache(maxsize=64)
+def raster_of(spec):
+    """The raster of a spec's samples."""
+    camera = [("views", np.eye(4, dtype=np.float32)[None]), ("intrinsics", np.ones((1, 4), np.float32))]
+    frame = _frames.Frame(_frames.options_of(spec), [*camera, *_merged.NO_MESH.items()])
+    raster = _library.Raster()
+    _library.call("dpr_frame_raster", frame.handle, ctypes.byref(raster))
+    return raster
+
+
+def _rendered(spec, arrays, wanted):
+    """(arrays of one frame, the frame) of all the call's meshes."""
+    def framed(lot, view=None):
+        return _frames.Frame(_frames.options_of(spec, lot.settings, 0, lot.names(wanted)), lot.named, view)
+
+    frames = _frames.frames_of(spec.parts)
+    alone = [_merged.Single(*frame, arrays, True) for frame in frames]
+    for mesh in alone:
+        mesh.named = _unpadded({**_merged.NO_MESH, **dict(mesh.named)})
+    if len(alone) == 1:
+        return alone[0], framed(alone[0])
+    for view, mesh in enumerate(alone):
+        if not _merged.is_regular(dict(mesh.named)):
+            framed(mesh, view)  # is refused
+    lot = _merged.Merged(frames, arrays)
+    try:
+        return lot, framed(lot)
+    except _library.InvalidArgument:
+        for view, mesh in enumerate(alone):  # by itself each says what is wrong
+            framed(mesh, view)
+        raise
+
+
+def _unpadded(arrays):
+    """(name, array) pairs in which meshes of a batch, faces [N, F, 3], are padded as frames take them: with faces of one
+    vertex, and vertices at the place of the first one."""
+    faces = arrays["faces"]
+    if faces.ndim < 3:
+        return list(arrays.items())
+    _merged.require_padding(faces)
+    arrays = {**arrays, "faces": faces.clip(0)}
+    if arrays["vertices"].ndim < 3 or len(arrays["vertices"]) != len(faces):
+        return list(arrays.items())  # is refused
+    is_there = np.arange(arrays["vertices"].shape[-2]) <= faces.max((1, 2))[:, None]
+    first = np.take_along_axis(arrays["vertices"], faces.clip(0)[:, :1, :1], 1)
+    vertices = np.where(is_there[..., None], arrays["vertices"], first)
+    return list({**arrays, "vertices": vertices}.items())
+
+
+def _of_layers(named):
+    """(name, packed array [layer, view, ...]) pairs as (dpr_array[], count): the layers' views are one after the other."""
+    return _frames.c_arrays([(name, array.reshape(-1, *array.shape[2:])) for name, array in named])
+
+
+def _one(name, array):
+    return _frames.c_arrays([(name, array)])[0]
+
+
+def _checked(name, array, shape):
+    """Packed floats. Fails for another shape."""
+    array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
+    if array.shape != shape or not array.size:
+        _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")
+    return array
