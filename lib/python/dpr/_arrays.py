@@ -48,9 +48,13 @@ def is_compiling():
     return _torch.is_compiling()
 
 
+_NAMES = {np.dtype(name): name for name in ("float32", "int32", "int64")}  # which NumPy takes microseconds to write
+
+
 def type_of(array):
     """"float32\""""
-    return str(array.dtype).rpartition(".")[2]
+    name = _NAMES.get(array.dtype) if isinstance(array, np.ndarray) else None
+    return name or str(array.dtype).rpartition(".")[2]
 
 
 def from_numbers(value, is_indices=False):
@@ -84,7 +88,9 @@ def converted(name, array, is_indices=False, where="dpr.render"):
     """The array as float32, or as int32 or int64. Fails for no array and for another kind of numbers."""
     if not is_array(array):
         fail(TypeError, name, type(array).__name__, "a tensor or an array", where)
-    kind = array.dtype.name if isinstance(array, np.ndarray) else type_of(array)
+    kind = type_of(array)
+    if kind != "float32" and isinstance(array, np.ndarray):
+        kind = array.dtype.name  # ">f4" is "float32"
     if is_indices:
         if not kind.startswith(("int", "uint")):
             fail(TypeError, name, kind, "int64 or int32, indices", where)
