@@ -169,6 +169,10 @@ std::vector<double> NormalSums::losses(const HypothesisImages& images, const Los
   return losses;
 }
 
+double NormalSums::measured_loss(const HypothesisImages& images, const MeasuredWeights& weights) {
+  return measured_->losses(images.colors, images.depths, images.views, weights).front() / total_;
+}
+
 void NormalSums::project(const HypothesisImages& images) {
   Device::Impl& d = impl_of(device_);
   const std::size_t size = k_channels * terms_;

@@ -89,6 +89,8 @@ class NormalSums {
 
   /// Losses of every view.
   std::vector<double> losses(const HypothesisImages& images, const LossScales& scales);
+  /// What coverage and depth add to the first hypothesis' loss.
+  double measured_loss(const HypothesisImages& images, const MeasuredWeights& weights);
   std::vector<NormalEquations> linearize(const HypothesisImages& images, const HypothesisTangents& tangents,
                                          const LossScales& scales);
   /// Of a single view, in images of that width. 4 n + 24 bytes a cell come back; there are at most 64 x 64.

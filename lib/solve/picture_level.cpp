@@ -186,12 +186,15 @@ std::vector<View> PictureLevel::views_of(std::span<const Hypothesis> hypotheses)
   return views;
 }
 
-const Buffer<cl_float4>& PictureLevel::render(Images& images, std::span<const View> views) {
+void PictureLevel::render(Images& images, std::span<const View> views) {
   images.renderer.set_views(views);
   if (images.shows_depths) show_depths(images.renderer);
   images.renderer.forward();
-  const Buffer<cl_float4>& samples = last_frame(images.renderer, "PictureLevel").image;
-  return samples_ == 1 ? samples : averaged(samples, images.means);
+  if (samples_ > 1) averaged(last_frame(images.renderer, "PictureLevel").image, images.means);
+}
+
+const Buffer<cl_float4>& PictureLevel::rendered(const Images& images) const {
+  return samples_ > 1 ? images.means : last_frame(images.renderer, "PictureLevel").image;
 }
 
 const Buffer<cl_float4>& PictureLevel::averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means) {
@@ -200,12 +203,18 @@ const Buffer<cl_float4>& PictureLevel::averaged(const Buffer<cl_float4>& samples
 }
 
 HypothesisImages PictureLevel::render(std::span<const Hypothesis> hypotheses) {
-  const std::vector<View> views = views_of(hypotheses);
-  const Buffer<cl_float4>* const depths = depths_ ? &render(*depths_, views) : nullptr;
-  // Of depths alone the coverage will do.
-  const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : render(colors_, views);
-  return {views.size(), colors, normals_ ? render(*normals_, views) : colors,
-          depths != nullptr ? *depths : colors};
+  const bool are_depths_alone = depths_ && !counts_colors_;  // then their coverage will do
+  if (!std::ranges::equal(hypotheses, shown_)) {
+    shown_.clear();
+    const std::vector<View> views = views_of(hypotheses);
+    if (depths_) render(*depths_, views);
+    if (!are_depths_alone) render(colors_, views);
+    if (normals_) render(*normals_, views);
+    shown_.assign(hypotheses.begin(), hypotheses.end());
+  }
+  const Buffer<cl_float4>& colors = rendered(are_depths_alone ? *depths_ : colors_);
+  return {hypotheses.size(), colors, normals_ ? rendered(*normals_) : colors,
+          depths_ ? rendered(*depths_) : colors};
 }
 
 std::pair<HypothesisImages, HypothesisTangents> PictureLevel::render_tangents(
@@ -331,11 +340,11 @@ LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
   LossParts parts;
   if (!has_unknown_background_ && !counts_depths) return parts;
   const HypothesisImages images = render({&hypothesis, 1});
-  const double loss = sums_->losses(images, scales_).front();
+  const double loss = sums_->measured_loss(images, scales_.measured);
   const auto without = [&](std::size_t kind) {
-    LossScales scales = scales_;
-    scales.measured[kind].weight = 0;
-    return sums_->losses(images, scales).front();
+    MeasuredWeights weights = scales_.measured;
+    weights[kind].weight = 0;
+    return sums_->measured_loss(images, weights);
   };
   if (has_unknown_background_) parts.uncovered = loss - without(k_coverage);
   if (counts_depths) {
@@ -343,10 +352,10 @@ LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
     constexpr double k_matched = 0.5;
     constexpr float k_sharper = 1e4F;
     const double others = without(k_depth);
-    LossScales most = scales_;
-    most.measured[k_depth].scale /= k_sharper;
-    most.measured[k_depth].weight *= k_sharper * k_sharper;
-    parts.matched = std::min(loss - others, k_matched * (sums_->losses(images, most).front() - others));
+    MeasuredWeights most = scales_.measured;
+    most[k_depth].scale /= k_sharper;
+    most[k_depth].weight *= k_sharper * k_sharper;
+    parts.matched = std::min(loss - others, k_matched * (sums_->measured_loss(images, most) - others));
   }
   return parts;
 }

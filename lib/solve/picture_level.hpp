@@ -88,13 +88,15 @@ class PictureLevel {
   void in_batches(std::span<const Hypothesis> hypotheses, std::size_t images_each,
                   const Visitor& visit) const;
   std::vector<View> views_of(std::span<const Hypothesis> hypotheses) const;
-  /// Images of views, pixels being means over their samples.
-  const Buffer<cl_float4>& render(Images& images, std::span<const View> views);
+  void render(Images& images, std::span<const View> views);
+  /// What was rendered last, pixels being means over their samples.
+  const Buffer<cl_float4>& rendered(const Images& images) const;
   const Buffer<cl_float4>& averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means);
   /// Takes the images to the level's size.
   void resample_images(const PictureImages& images);
   /// What was observed beside colours, at the level's size.
   std::vector<cl_float4> measured(const PictureImages& images) const;
+  /// Images of hypotheses; what they show already is not rendered again.
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
   /// The same beside their tangents.
   std::pair<HypothesisImages, HypothesisTangents> render_tangents(std::span<const Hypothesis> hypotheses);
@@ -105,6 +107,7 @@ class PictureLevel {
   Scene scene_;  // of the samples' size
   Images colors_;
   std::optional<Images> normals_, depths_;
+  std::vector<Hypothesis> shown_;         // by all images
   bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
   bool has_unknown_background_, weighs_observations_;
   Image mask_, allowed_;  // of the level's size; where the object may be, if the background is not known

@@ -17,6 +17,11 @@ struct Hypothesis {
   Pose pose;
   double focal_scale = 1;
   glm::dvec2 radial{0.0};
+
+  bool operator==(const Hypothesis& other) const {
+    return pose.rotation == other.pose.rotation && pose.translation == other.pose.translation &&
+           focal_scale == other.focal_scale && radial == other.radial;
+  }
 };
 
 /// Steps in the tangent space at a hypothesis: a rotation vector on the left (radians); then, if asked for,

@@ -77,6 +77,15 @@ struct PoseTracker::Impl {
     return options.search_interval > 0 && misses % options.search_interval == 0 &&
            options.method.rotations > 0;
   }
+  /// A pose of a frame, and the loss below which it explains that.
+  struct Judged {
+    Candidate candidate;
+    double below;
+
+    /// The loss in parts of what is allowed: no number if nothing is left or allowed.
+    double share() const { return candidate.equations.loss / below; }
+  };
+  Judged judge(const Candidate& candidate) { return {candidate, explained_below(candidate.hypothesis)}; }
   /// 0 of a hypothesis that covers nothing where the background is not known.
   double explained_below(const Hypothesis& hypothesis) {
     const double unexplained = levels->unexplained(levels->size() - 1);
@@ -85,24 +94,19 @@ struct PoseTracker::Impl {
     if (covered <= k_least_covered * unexplained) return 0;
     return parts.sum() + explained_part(options.explained, options.method.robust) * covered;
   }
-  /// The loss in parts of what is allowed: below 1 if it explains the frame; no number if nothing is left or allowed.
-  double share(const Candidate& candidate) {
-    return candidate.equations.loss / explained_below(candidate.hypothesis);
-  }
-  bool is_explained(const Candidate& candidate) { return share(candidate) < 1; }
 
   void check(const TrackFrame& frame) const;
   TrackedPose first(const TrackFrame& frame);
   void make_levels(const Pose& near, const TrackFrame& frame);
-  std::optional<Candidate> follow();
+  std::optional<Judged> follow();
   std::size_t first_level() const;
   Candidate follow_from(std::size_t level, const Pose& pose);
   void descend(std::vector<Candidate>& candidates, const Beam& beam);
-  std::optional<Candidate> search();
-  std::optional<Candidate> best_about();
-  std::optional<Candidate> best_everywhere();
-  std::optional<Candidate> judged(const std::vector<Candidate>& candidates);
-  TrackedPose result(TrackStatus status, const Candidate& candidate);
+  std::optional<Judged> search();
+  std::optional<Judged> best_about();
+  std::optional<Judged> best_everywhere();
+  std::optional<Judged> judged(const std::vector<Candidate>& candidates);
+  TrackedPose result(TrackStatus status, const Judged& judged);
   TrackedPose missed();
 
   Device device;
@@ -184,7 +188,7 @@ TrackedPose PoseTracker::Impl::first(const TrackFrame& frame) {
   }
   seen = std::move(fitted);
   make_levels(seen->result.pose, frame);
-  return result(TrackStatus::found, follow_from(levels->size() - 1, seen->result.pose));
+  return result(TrackStatus::found, judge(follow_from(levels->size() - 1, seen->result.pose)));
 }
 
 void PoseTracker::Impl::make_levels(const Pose& near, const TrackFrame& frame) {
@@ -215,14 +219,14 @@ Candidate PoseTracker::Impl::follow_from(std::size_t level, const Pose& pose) {
 }
 
 /// The pose in the next frame, where that explains it.
-std::optional<Candidate> PoseTracker::Impl::follow() {
+std::optional<PoseTracker::Impl::Judged> PoseTracker::Impl::follow() {
   // Losses that rise by so much, and are not small, may be those of a pose that has slipped.
   constexpr double k_unusual = 4, k_not_small = 0.25;
   const Pose expected = motion.next();
-  const Candidate candidate = follow_from(first_level(), expected);
-  const double part = share(candidate);
-  if (part < 1 && part < std::max(k_unusual * usual_share, k_not_small)) return candidate;
-  std::vector<Candidate> candidates{{{expected}}, {{motion.last()}}, candidate};
+  const Judged followed = judge(follow_from(first_level(), expected));
+  const double part = followed.share();
+  if (part < 1 && part < std::max(k_unusual * usual_share, k_not_small)) return followed;
+  std::vector<Candidate> candidates{{{expected}}, {{motion.last()}}, followed.candidate};
   descend(candidates, k_narrow_beam);
   return judged(candidates);
 }
@@ -237,11 +241,12 @@ void PoseTracker::Impl::descend(std::vector<Candidate>& candidates, const Beam& 
 
 /// The best of candidates at the finest level, or the one nearest to the motion of those that are as good: none if it
 /// does not explain the frame, or another leaves little more.
-std::optional<Candidate> PoseTracker::Impl::judged(const std::vector<Candidate>& candidates) {
+std::optional<PoseTracker::Impl::Judged> PoseTracker::Impl::judged(const std::vector<Candidate>& candidates) {
   const Candidate& best = candidates.front();
   least_loss = std::min(least_loss, best.equations.loss);
   const double enough = enough_to_equal(best.equations.loss, levels->unexplained(levels->size() - 1));
-  if (!is_explained(best) || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
+  const Judged judged_best = judge(best);
+  if (!(judged_best.share() < 1) || is_doubtful(candidates, levels->space(), enough)) return std::nullopt;
   const Hypothesis expected{motion.next()};
   const Candidate* nearest = &best;
   for (const Candidate& c : candidates) {
@@ -250,16 +255,16 @@ std::optional<Candidate> PoseTracker::Impl::judged(const std::vector<Candidate>&
     };
     if (c.equations.loss <= enough && distance(c) < distance(*nearest)) nearest = &c;
   }
-  return *nearest;
+  return nearest == &best ? judged_best : judge(*nearest);
 }
 
-std::optional<Candidate> PoseTracker::Impl::search() {
+std::optional<PoseTracker::Impl::Judged> PoseTracker::Impl::search() {
   if (const auto near = best_about()) return near;
   return is_due() ? best_everywhere() : std::nullopt;
 }
 
 /// About the last pose, and about the one that its motion would have led to.
-std::optional<Candidate> PoseTracker::Impl::best_about() {
+std::optional<PoseTracker::Impl::Judged> PoseTracker::Impl::best_about() {
   std::vector<Hypothesis> hypotheses;
   for (const Pose& pose : {motion.last(), motion.next()}) {
     const auto about = hypotheses_about(pose, levels->space(), pivot.scene(), options.solve_translation);
@@ -270,7 +275,7 @@ std::optional<Candidate> PoseTracker::Impl::best_about() {
   return judged(candidates);
 }
 
-std::optional<Candidate> PoseTracker::Impl::best_everywhere() {
+std::optional<PoseTracker::Impl::Judged> PoseTracker::Impl::best_everywhere() {
   const Beam& beam = beam_of(options.method);
   const auto hypotheses = hypotheses_everywhere(motion.last().translation, levels->space(), pivot.scene(),
                                                 options.method.rotations, options.solve_translation);
@@ -287,12 +292,13 @@ std::optional<Candidate> PoseTracker::Impl::best_everywhere() {
   return judged(candidates);
 }
 
-TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candidate) {
+TrackedPose PoseTracker::Impl::result(TrackStatus status, const Judged& judged) {
   constexpr double k_newest = 0.2;  // its weight in the mean
-  const Pose& pose = candidate.hypothesis.pose;
-  const double below = explained_below(candidate.hypothesis), part = candidate.equations.loss / below;
+  const Hypothesis& hypothesis = judged.candidate.hypothesis;
+  const Pose& pose = hypothesis.pose;
+  const double part = judged.share();
   const bool is_followed = status == TrackStatus::tracked;
-  surprise = is_followed ? levels->space().distance({motion.next()}, candidate.hypothesis)
+  surprise = is_followed ? levels->space().distance({motion.next()}, hypothesis)
                          : std::numeric_limits<double>::infinity();
   usual_share = is_followed && usual_share > 0 ? (1 - k_newest) * usual_share + k_newest * part : part;
   if (is_followed) {
@@ -303,10 +309,10 @@ TrackedPose PoseTracker::Impl::result(TrackStatus status, const Candidate& candi
   misses = 0;
   TrackedPose tracked{.status = status,
                       .pose = pivot.to_origin(pose),
-                      .loss = candidate.equations.loss,
-                      .explained_below = below};
+                      .loss = judged.candidate.equations.loss,
+                      .explained_below = judged.below};
   if (options.covariance) {
-    tracked.covariance = pose_covariance(levels->finest(), levels->space(), candidate.hypothesis);
+    tracked.covariance = pose_covariance(levels->finest(), levels->space(), hypothesis);
     pivot.to_origin(pose, tracked.covariance);
   }
   return tracked;

@@ -159,7 +159,7 @@ TEST_SUITE("pipeline") {
         ++compared;
       }
     }
-    CHECK(compared > (is_reduced() ? 50 : 2000));
+    CHECK(compared > (is_reduced() ? 10 : 2000));
     CHECK(worst < 2e-3);
 
     // Of a plane of attributes the steps are those of its plane: positions move by as much as the camera's rays part.
