@@ -190,22 +190,24 @@ kernel void normal_lit(const uint pixels, const uint views, const float4 backgro
   if (background.w != 0.0f) tangent = mad3n(wanted, -moved.alpha, tangent);
 #else
   const size_t view = m.view;
-  global const float* light = fits + view * DPR_FIT_LENGTH + 1;
-  const Facing facing = load_facing(m.first, pixels, normals + view * pixels);
-  tangent = mad3n(sub3n(light_at(light, DPR_FACTORS), behind_object(background, wanted)), moved.alpha,
-                  mul3n(tangent, shade(facing.basis, light)));
+  const PixelsN image = load_pixels(m.first, pixels, colors + view * pixels);
+  if (any_lane(image.alpha > 0.0f) || any_lane(moved.alpha != 0.0f)) {  // elsewhere nothing shows
+    global const float* light = fits + view * DPR_FIT_LENGTH + 1;
+    const Facing facing = load_facing(m.first, pixels, normals + view * pixels);
+    tangent = mad3n(sub3n(light_at(light, DPR_FACTORS), behind_object(background, wanted)), moved.alpha,
+                    mul3n(tangent, shade(facing.basis, light)));
 #if DPR_FACTORS == DPR_HARMONICS
-  // The derivative of n / |n| is a symmetric matrix: its product with a gradient is that with a tangent.
-  const Vec3n turned =
-      normalize3n_backward(facing.normal, facing.inverse_length,
-                           load_pixels(m.first, pixels, normal_tangents + m.image * pixels).color);
-  realn basis[DPR_HARMONICS];
-  harmonic_basis_tangent(facing.normal, turned, basis);
-  const Vec3n color = load_pixels(m.first, pixels, colors + view * pixels).color;
-  tangent = mad3n(mul3n(color, shade(basis, light)), (realn)(1.0f), tangent);
+    // The derivative of n / |n| is a symmetric matrix: its product with a gradient is that with a tangent.
+    const Vec3n turned =
+        normalize3n_backward(facing.normal, facing.inverse_length,
+                             load_pixels(m.first, pixels, normal_tangents + m.image * pixels).color);
+    realn basis[DPR_HARMONICS];
+    harmonic_basis_tangent(facing.normal, turned, basis);
+    tangent = mad3n(mul3n(image.color, shade(basis, light)), (realn)(1.0f), tangent);
 #else
-  (void)colors, (void)normal_tangents;
+    (void)normal_tangents;
 #endif
+  }
 #endif
   store_planes(tangent, m.first, pixels, pixels, lit + 3 * m.image * pixels);
 }
@@ -256,12 +258,14 @@ kernel void normal_left(const uint pixels, const uint views, global const float*
   if (m.image >= DPR_DIRECTIONS * views) return;
   global const float* light = taken + m.image * 3 * DPR_TERMS;
   const PixelsN image = load_pixels(m.first, pixels, colors + (size_t)m.view * pixels);
-  const Facing facing = load_facing(m.first, pixels, normals + (size_t)m.view * pixels);
-  const Vec3n change =
-      mad3n(light_at(light, DPR_FACTORS), image.alpha, mul3n(image.color, shade(facing.basis, light)));
   const size_t place = 3 * m.image * pixels;
-  store_planes(sub3n(load_planes(m.first, pixels, pixels, lit + place), change), m.first, pixels, pixels,
-               left + place);
+  Vec3n rest = load_planes(m.first, pixels, pixels, lit + place);
+  if (any_lane(image.alpha > 0.0f)) {
+    const Facing facing = load_facing(m.first, pixels, normals + (size_t)m.view * pixels);
+    rest = sub3n(rest, mad3n(light_at(light, DPR_FACTORS), image.alpha,
+                             mul3n(image.color, shade(facing.basis, light))));
+  }
+  store_planes(rest, m.first, pixels, pixels, left + place);
 }
 #endif
 
