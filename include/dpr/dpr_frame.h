@@ -27,7 +27,7 @@
  *   lights.ambient       [3]                  0.5 without
  *   lights.harmonics     [9, 3]
  *   lights.point         [L, 9]               position, diffuse, specular
- *   lights.directional   [L, 9]               direction, diffuse, specular
+ *   lights.directional   [L, 9]               direction, away from the light, diffuse, specular
  *   lights.spot          [L, 14]              position, direction, angle and inner angle in degrees, diffuse,
  *                                             specular
  *   sigma, gamma, alpha  [] or [1]            instead of the settings'

@@ -128,8 +128,8 @@ class Renderer:
         background   [3], linear RGB; black unless given. A picture: image[..., :3] + (1 - image[..., 3:]) * picture
         lights       a dictionary, with what it names: "ambient" [3] (0.5 if left out), "harmonics" [9, 3], "point"
                      [L, 9] (position, diffuse, specular), "directional" [L, 9] (direction, diffuse, specular), "spot"
-                     [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular); with a leading
-                     N of each view by itself. Without a dictionary colours are as they are.
+                     [L, 14] (position, direction, angle and inner angle in degrees, diffuse, specular), directions away
+                     from the light; with N in front of each view by itself. Without a dictionary colours are as they are.
         sigma or blur, gamma, alpha   instead of the settings': numbers, or tensors of one number
         outputs      names of "depth", "position", "normal", "texcoords", "face_id", "barycentrics", "uv",
                      "effective_faces". The first four are those of what may cover a pixel, at full size wherever alpha
