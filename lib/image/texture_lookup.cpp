@@ -52,8 +52,7 @@ void in_parallel(std::size_t count, const Function& function) {
       std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least + 1);
   std::vector<std::future<void>> others;
   for (std::size_t i = 1; i < parts; ++i)
-    others.push_back(
-        std::async(std::launch::async, function, Places{count * i / parts, count * (i + 1) / parts}));
+    others.push_back(std::async(function, Places{count * i / parts, count * (i + 1) / parts}));
   function(Places{0, count / parts});
   for (std::future<void>& other : others) other.get();
 }
@@ -117,7 +116,7 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
     };
     if (!moves) return gradients.texels.empty() ? void() : gather();
     std::future<void> gathered;
-    if (!gradients.texels.empty()) gathered = std::async(std::launch::async, gather);
+    if (!gradients.texels.empty()) gathered = std::async(gather);
     using T = taps::Derived<Shape::k_inputs>;
     in_parallel(count, [&](const Places& range) {
       for_each_place<Shape, T>(texture, places, range, [&](std::size_t k, const taps::Taps<T>& mixture) {

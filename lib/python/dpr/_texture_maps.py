@@ -71,6 +71,9 @@ def _checked(texels, texcoords, steps, levels, wrap, filter, where):
     given = {"texcoords": texcoords, "steps": steps, "levels": levels, "texels": texels}
     arrays = {name: _arrays.converted(name, _arrays.from_numbers(array), where=where)
               for name, array in given.items() if array is not None}
+    for name, array in arrays.items():
+        if _arrays.module_of(array) == "torch" and array.device.type != "cpu":
+            _arrays.fail(ValueError, name, f"a tensor on {array.device}", "one on the CPU", where)
     shapes = {name: tuple(array.shape) for name, array in arrays.items()}
     if len(shapes["texcoords"]) != 4 or shapes["texcoords"][-1] not in (2, 3):
         _arrays.fail(ValueError, "texcoords", list(shapes["texcoords"]), "[N, h, w, 2], or directions [N, h, w, 3]", where)
