@@ -1,5 +1,5 @@
 // Numbers of vertices at samples, from named arrays, in the C interface.
-#include "dpr/interpolate.hpp"
+#include "renderer/interpolate.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -74,11 +74,11 @@ class InterpolateCall {
 
   void read_samples(const NamedArray* steps) {
     const std::span ids(static_cast<const std::int64_t*>(face_id_.data), face_id_.count());
-    for (const std::int64_t face : ids) {
-      if (face < -1 || face > std::numeric_limits<std::int32_t>::max())
-        throw InvalidArgument(argument(face_id_), std::to_string(face), "faces, or -1");
-      samples_.faces.push_back(static_cast<std::int32_t>(face));
-    }
+    const auto wrong = std::ranges::find_if(
+        ids, [](std::int64_t face) { return face < -1 || face > std::numeric_limits<std::int32_t>::max(); });
+    if (wrong != ids.end()) throw InvalidArgument(argument(face_id_), std::to_string(*wrong), "faces, or -1");
+    samples_.faces.assign(ids.begin(), ids.end());
+    samples_.barycentrics.reserve(ids.size());
     for (const glm::vec3& b : barycentrics_.rows<const glm::vec3>())
       samples_.barycentrics.emplace_back(b.y, b.z);
     if (!steps) return;
@@ -108,9 +108,13 @@ void interpolate_to(NamedArrays arrays, NamedArrays outputs) {
     if (!are_steps && output.name != "values") refuse(output, "values or steps");
     call.require_values(output, are_steps ? 2 : 1);
   }
-  for (const NamedArray& output : outputs)
-    copy_to(output, output.name == "steps" ? interpolate_steps(call.samples(), call.attributes())
-                                           : interpolate(call.samples(), call.attributes()));
+  for (const NamedArray& output : outputs) {
+    if (output.name == "steps") {
+      copy_to(output, interpolate_steps(call.samples(), call.attributes()));
+    } else {
+      interpolate(call.samples(), call.attributes(), output.rows<float>());
+    }
+  }
 }
 
 void backward(NamedArrays arrays, NamedArrays grads, NamedArrays gradients) {

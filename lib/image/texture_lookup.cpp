@@ -2,8 +2,8 @@
 
 #include <future>
 #include <numeric>
-#include <thread>
 
+#include "base/parallel.hpp"
 #include "image/texture_taps.hpp"
 
 namespace dpr {
@@ -39,30 +39,12 @@ decltype(auto) at_input(const Places& places, std::size_t k, int i, const Functi
 /// 0 where there are none.
 float number_of(std::span<const float> of, std::size_t at) { return of.empty() ? 0.0F : of[at]; }
 
-struct Places {
-  std::size_t first, last;
-};
-
-/// Calls `function` with ranges of all places, on the processor's threads where there are many.
-template <class Function>
-void in_parallel(std::size_t count, const Function& function) {
-  constexpr std::size_t k_least =
-      1U << 14U;  // of a thread: starting one takes as long as some hundred of them
-  const std::size_t parts =
-      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least + 1);
-  std::vector<std::future<void>> others;
-  for (std::size_t i = 1; i < parts; ++i)
-    others.push_back(std::async(function, Places{count * i / parts, count * (i + 1) / parts}));
-  function(Places{0, count / parts});
-  for (std::future<void>& other : others) other.get();
-}
-
 /// Calls `function` with each place's number, and the texels that it is a mixture of.
 template <class Shape, class T, class Function>
-void for_each_place(const TextureLookup& texture, const TexturePlaces& places, const Places& range,
-                    const Function& function) {
+void for_each_place(const TextureLookup& texture, const TexturePlaces& places, std::size_t first,
+                    std::size_t last, const Function& function) {
   const taps::Reads reads{!places.steps.empty(), !places.levels.empty()};
-  for (std::size_t k = range.first; k < range.last; ++k) {
+  for (std::size_t k = first; k < last; ++k) {
     const auto number = [&](int i) -> T {
       const float value = at_input<Shape::k_dimensions>(places, k, i, number_of);
       if constexpr (std::is_same_v<T, float>) {
@@ -85,9 +67,9 @@ void look_up(const TextureLookup& texture, const TexturePlaces& places, std::spa
   const std::size_t channels = texture.channels;
   std::ranges::fill(values, 0.0F);
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
-    in_parallel(texture.count(places), [&](const Places& range) {
+    in_parallel(texture.count(places), [&](std::size_t first, std::size_t last) {
       for_each_place<Shape, float>(
-          texture, places, range, [&](std::size_t k, const taps::Taps<float>& mixture) {
+          texture, places, first, last, [&](std::size_t k, const taps::Taps<float>& mixture) {
             for (const taps::Tap<float>& tap : mixture) {
               const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
               for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
@@ -105,7 +87,7 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     // Places share texels: one thread gathers these, in order.
     const auto gather = [&] {
-      for_each_place<Shape, float>(texture, places, {0, count},
+      for_each_place<Shape, float>(texture, places, 0, count,
                                    [&](std::size_t k, const taps::Taps<float>& mixture) {
                                      for (const taps::Tap<float>& tap : mixture) {
                                        float* grad = &gradients.texels[tap.level][channels * tap.texel];
@@ -118,19 +100,20 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
     std::future<void> gathered;
     if (!gradients.texels.empty()) gathered = std::async(gather);
     using T = taps::Derived<Shape::k_inputs>;
-    in_parallel(count, [&](const Places& range) {
-      for_each_place<Shape, T>(texture, places, range, [&](std::size_t k, const taps::Taps<T>& mixture) {
-        typename T::DerType by_input = T::DerType::Zero();
-        for (const taps::Tap<T>& tap : mixture) {
-          const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
-          by_input += std::inner_product(texel, texel + channels, &grad_values[channels * k], 0.0F) *
-                      tap.weight.derivatives();
-        }
-        for (int i = 0; i < Shape::k_inputs; ++i)
-          at_input<Shape::k_dimensions>(gradients, k, i, [&](std::span<float> of, std::size_t at) {
-            if (!of.empty()) of[at] += by_input[i];
+    in_parallel(count, [&](std::size_t first, std::size_t last) {
+      for_each_place<Shape, T>(
+          texture, places, first, last, [&](std::size_t k, const taps::Taps<T>& mixture) {
+            typename T::DerType by_input = T::DerType::Zero();
+            for (const taps::Tap<T>& tap : mixture) {
+              const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
+              by_input += std::inner_product(texel, texel + channels, &grad_values[channels * k], 0.0F) *
+                          tap.weight.derivatives();
+            }
+            for (int i = 0; i < Shape::k_inputs; ++i)
+              at_input<Shape::k_dimensions>(gradients, k, i, [&](std::span<float> of, std::size_t at) {
+                if (!of.empty()) of[at] += by_input[i];
+              });
           });
-      });
     });
     if (gathered.valid()) gathered.get();
   });
@@ -142,21 +125,23 @@ void look_up_tangent(const TextureLookup& texture, const TexturePlaces& places, 
   std::ranges::fill(tangents, 0.0F);
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     using T = taps::Derived<Shape::k_inputs>;
-    in_parallel(texture.count(places), [&](const Places& range) {
-      for_each_place<Shape, T>(texture, places, range, [&](std::size_t k, const taps::Taps<T>& mixture) {
-        typename T::DerType speed;
-        for (int i = 0; i < Shape::k_inputs; ++i)
-          speed[i] = at_input<Shape::k_dimensions>(moving, k, i, number_of);
-        for (const taps::Tap<T>& tap : mixture) {
-          const std::size_t first = channels * tap.texel;
-          const float change = (tap.weight.derivatives() * speed).sum();
-          for (std::size_t c = 0; c < channels; ++c) {
-            float& tangent = tangents[channels * k + c];
-            tangent += change * texture.levels[tap.level].texels[first + c];
-            if (!moving_texels.empty()) tangent += tap.weight.value() * moving_texels[tap.level][first + c];
-          }
-        }
-      });
+    in_parallel(texture.count(places), [&](std::size_t first, std::size_t last) {
+      for_each_place<Shape, T>(texture, places, first, last,
+                               [&](std::size_t k, const taps::Taps<T>& mixture) {
+                                 typename T::DerType speed;
+                                 for (int i = 0; i < Shape::k_inputs; ++i)
+                                   speed[i] = at_input<Shape::k_dimensions>(moving, k, i, number_of);
+                                 for (const taps::Tap<T>& tap : mixture) {
+                                   const std::size_t at = channels * tap.texel;
+                                   const float change = (tap.weight.derivatives() * speed).sum();
+                                   for (std::size_t c = 0; c < channels; ++c) {
+                                     float& tangent = tangents[channels * k + c];
+                                     tangent += change * texture.levels[tap.level].texels[at + c];
+                                     if (!moving_texels.empty())
+                                       tangent += tap.weight.value() * moving_texels[tap.level][at + c];
+                                   }
+                                 }
+                               });
     });
   });
 }

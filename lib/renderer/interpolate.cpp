@@ -1,11 +1,13 @@
 // Numbers of vertices at samples, and what comes back.
-#include "dpr/interpolate.hpp"
+#include "renderer/interpolate.hpp"
 
 #include <algorithm>
 #include <array>
+#include <future>
 #include <string>
 
 #include "base/checks.hpp"
+#include "base/parallel.hpp"
 
 namespace dpr {
 namespace {
@@ -93,16 +95,29 @@ float mixed(std::span<const float> values, const std::array<std::size_t, 3>& cor
 }  // namespace
 
 std::vector<float> interpolate(const Samples& samples, const Attributes& attributes) {
+  std::vector<float> values(samples.faces.size() * attributes.channels);
+  interpolate(samples, attributes, values);
+  return values;
+}
+
+void interpolate(const Samples& samples, const Attributes& attributes, std::span<float> values) {
   const Table table(samples, attributes);
-  std::vector<float> found(table.count() * table.channels());
-  for (std::size_t i = 0; i < table.count(); ++i) {
-    if (table.is_empty(i)) continue;
-    const auto corners = table.corners(i);
-    const auto weights = weights_of(samples.barycentrics[i]);
-    for (std::size_t c = 0; c < table.channels(); ++c)
-      found[i * table.channels() + c] = mixed(attributes.values, corners, c, weights);
-  }
-  return found;
+  const std::size_t channels = table.channels();
+  if (values.size() != table.count() * channels)
+    throw InvalidArgument("values (interpolate)", std::to_string(values.size()),
+                          std::to_string(table.count() * channels));
+  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const std::span<float> to = values.subspan(i * channels, channels);
+      if (table.is_empty(i)) {
+        std::ranges::fill(to, 0.0F);
+        continue;
+      }
+      const auto corners = table.corners(i);
+      const auto weights = weights_of(samples.barycentrics[i]);
+      for (std::size_t c = 0; c < channels; ++c) to[c] = mixed(attributes.values, corners, c, weights);
+    }
+  });
 }
 
 std::vector<float> interpolate_steps(const Samples& samples, const Attributes& attributes) {
@@ -132,26 +147,42 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
     table.require_steps();
     checks::require_numbers(grad_steps, 2 * grad_values.size(), "grad_steps (interpolate)");
   }
+  const std::size_t channels = table.channels();
   InterpolateGradient found{std::vector<float>(attributes.values.size()), std::vector<vec2>(table.count())};
-  for (std::size_t i = 0; i < table.count(); ++i) {
-    if (table.is_empty(i)) continue;
-    const auto corners = table.corners(i);
-    const auto add = [&](std::size_t channel, float grad, const std::array<float, 3>& weights) {
-      for (std::size_t k = 0; k < 3; ++k) found.values[corners[k] + channel] += grad * weights[k];
-    };
-    const auto weights = weights_of(samples.barycentrics[i]);
-    for (std::size_t c = 0; c < table.channels(); ++c) {
-      const float grad = grad_values[i * table.channels() + c];
-      add(c, grad, weights);
-      found.barycentrics[i].x += grad * mixed(attributes.values, corners, c, changes_of(1, 0));
-      found.barycentrics[i].y += grad * mixed(attributes.values, corners, c, changes_of(0, 1));
+  // Samples share rows: one thread gathers these, in order.
+  const auto gather = [&] {
+    for (std::size_t i = 0; i < table.count(); ++i) {
+      if (table.is_empty(i)) continue;
+      const auto corners = table.corners(i);
+      const auto add = [&](std::size_t channel, float grad, const std::array<float, 3>& weights) {
+        for (std::size_t k = 0; k < 3; ++k) found.values[corners[k] + channel] += grad * weights[k];
+      };
+      const auto weights = weights_of(samples.barycentrics[i]);
+      for (std::size_t c = 0; c < channels; ++c) add(c, grad_values[i * channels + c], weights);
       if (grad_steps.empty()) continue;
       const vec4& step = samples.steps[i];
-      const float* of_step = &grad_steps[2 * (i * table.channels() + c)];
-      add(c, of_step[0], changes_of(step.x, step.z));
-      add(c, of_step[1], changes_of(step.y, step.w));
+      for (std::size_t c = 0; c < channels; ++c) {
+        const float* const of_step = &grad_steps[2 * (i * channels + c)];
+        add(c, of_step[0], changes_of(step.x, step.z));
+        add(c, of_step[1], changes_of(step.y, step.w));
+      }
     }
-  }
+  };
+  std::future<void> gathered = std::async(gather);
+  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      if (table.is_empty(i)) continue;
+      const auto corners = table.corners(i);
+      vec2 by_place(0);
+      for (std::size_t c = 0; c < channels; ++c) {
+        by_place +=
+            grad_values[i * channels + c] * vec2(mixed(attributes.values, corners, c, changes_of(1, 0)),
+                                                 mixed(attributes.values, corners, c, changes_of(0, 1)));
+      }
+      found.barycentrics[i] = by_place;
+    }
+  });
+  gathered.get();
   return found;
 }
 

@@ -224,14 +224,18 @@ Samples Renderer::samples(bool with_steps) {
                 {},
                 {},
                 {}};
+  found.faces.reserve(m.surface_samples->faces.size());
   for (const cl_uint face : m.surface_samples->faces.download())
     found.faces.push_back(face == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(face));
+  found.barycentrics.reserve(found.faces.size());
+  found.depths.reserve(found.faces.size());
   for (const cl_float4& place : m.surface_samples->places.download()) {
     found.barycentrics.emplace_back(place.s[0], place.s[1]);
     found.depths.push_back(place.s[2]);
   }
   if (with_steps) {
     m.surface_samples->find_steps(m.frame, m.setup.triangles, m.clip.faces);
+    found.steps.reserve(found.faces.size());
     for (const cl_float4& step : m.surface_samples->steps.download())
       found.steps.emplace_back(step.s[0], step.s[1], step.s[2], step.s[3]);
   }

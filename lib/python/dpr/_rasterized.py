@@ -176,3 +176,29 @@ def _checked(name, array, shape):
     if array.shape != shape or not array.size:
         _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")
     return array
+
+
+def _at_samples(face_id, barycentrics, attributes, faces):
+    """Attributes [V, C] or [N, V, C] and what they are interpolated by, as the library has them."""
+    if attributes.ndim == 3 and len(attributes) == 1:
+        attributes = attributes[0]
+    return [("face_id", np.ascontiguousarray(face_id)), ("barycentrics", np.ascontiguousarray(barycentrics)),
+            ("attributes", np.ascontiguousarray(attributes)), ("faces", np.ascontiguousarray(faces.clip(0)))]
+
+
+@_arrays.named("dpr.Samples")
+def interpolated(face_id, barycentrics, attributes, faces):
+    """Attributes at samples of one layer, [N, h, w, C]; 0 where nothing is."""
+    named = _at_samples(face_id, barycentrics, attributes, faces)  # which the library reads
+    values = np.empty((*face_id.shape, attributes.shape[-1]), np.float32)
+    _library.call("dpr_interpolate", *_frames.c_arrays(named), *_frames.c_arrays([("values", values)]))
+    return values
+
+
+def interpolated_gradients(face_id, barycentrics, attributes, faces, grad):
+    """(those of barycentrics, those of attributes)"""
+    named, grad = _at_samples(face_id, barycentrics, attributes, faces), np.ascontiguousarray(grad)
+    found = [("barycentrics", np.empty(barycentrics.shape, np.float32)), ("attributes", np.empty(named[2][1].shape, np.float32))]
+    _library.call("dpr_interpolate_backward", *_frames.c_arrays(named),
+                  *_frames.c_arrays([("values", grad)]), *_frames.c_arrays(found))
+    return found[0][1], found[1][1].reshape(attributes.shape)

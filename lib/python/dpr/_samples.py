@@ -7,7 +7,7 @@ from typing import Any, Callable, Dict, Optional, Tuple
 import numpy as np
 
 from . import _arrays, _numpy
-from ._rasterized import Rasterized
+from ._rasterized import Rasterized, interpolated
 
 Array = Any
 
@@ -70,7 +70,17 @@ class Samples:
         """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3], or
         [N, F, 3] as those of rasterize(), indices of the attributes for the corners of the mesh's faces, where they have
         some of their own. Of a list of meshes both are lists too. Raises ValueError for other shapes and indices."""
-        return (self.barycentrics[..., None] * self._at_corners(attributes, faces)).sum(-2)
+        attributes, faces = self._tables_of(attributes, faces)
+        if not self._is_of_jax and 0 not in (*faces.shape, attributes.shape[-2]):
+            if self._tensors is not None:
+                from . import _interpolate
+                return _interpolate.interpolate(self.face_id, self.barycentrics, attributes, faces, self._mixed)
+            if isinstance(attributes, np.ndarray):
+                return interpolated(self.face_id, self.barycentrics, attributes, faces)
+        return self._mixed(self.barycentrics, attributes, faces)
+
+    def _mixed(self, barycentrics, attributes, faces):
+        return (barycentrics[..., None] * self._at_corners(attributes, faces)).sum(-2)
 
     def interpolate_steps(self, attributes: Array, faces: Optional[Array] = None) -> Array:
         """How fast interpolate(attributes, faces) changes from sample to sample to the right and down, [N, h, w, C, 2]: of
@@ -78,10 +88,10 @@ class Samples:
         if self._is_of_jax:
             _arrays.fail(TypeError, "interpolate_steps()", "samples of JAX", "those of other arrays", "dpr.Samples")
         steps = _arrays.like(self.depth, self._rasterized.steps[self._layer])
-        return (steps[..., None, :] * self._at_corners(attributes, faces)[..., None]).sum(-3)
+        return (steps[..., None, :] * self._at_corners(*self._tables_of(attributes, faces))[..., None]).sum(-3)
 
-    def _at_corners(self, attributes, faces):
-        """[N, h, w, 3, C], or what broadcasts to it: attributes of the corners of the samples' faces."""
+    def _tables_of(self, attributes, faces):
+        """What was given as attributes [V, C] or [N, V, C], and faces."""
         attributes, faces = _arrays.from_numbers(attributes), _arrays.from_numbers(faces, True)
         if isinstance(attributes, (list, tuple)) and self._is_of_list:
             attributes, faces = self._tables(attributes, faces)
@@ -90,7 +100,10 @@ class Samples:
             if len(counts) > 1 and faces is None and len(getattr(attributes, "shape", ())) == 2:
                 _arrays.fail(ValueError, "attributes", list(attributes.shape), f"a list of {len(self._meshes)}", "dpr.Samples")
             attributes, faces = self._table("", attributes, faces, max(counts), tuple(self._faces.shape))
-        faces = self._faces if faces is None else faces
+        return attributes, self._faces if faces is None else faces
+
+    def _at_corners(self, attributes, faces):
+        """[N, h, w, 3, C], or what broadcasts to it: attributes of the corners of the samples' faces."""
         if 0 in (*faces.shape, attributes.shape[-2]):
             return attributes.sum(-2)[..., None, None, None, :]  # there is nothing
         meshes = np.arange(len(faces))[:, None, None]

@@ -1,0 +1,41 @@
+"""Attributes at samples, in PyTorch: by the library where a pass back is all that is asked for."""
+import torch
+from torch.autograd import forward_ad
+
+from . import _arrays, _rasterized
+
+
+class _Interpolate(torch.autograd.Function):
+    """(formula, samples' faces, barycentrics, attributes, faces) to values. The formula is the same of PyTorch's operations."""
+
+    @staticmethod
+    def forward(ctx, mixed, face_id, barycentrics, attributes, faces):
+        ctx.mixed = mixed
+        ctx.save_for_backward(face_id, barycentrics, attributes, faces)
+        return torch.from_numpy(_rasterized.interpolated(*map(_arrays.to_numpy, ctx.to_save)))
+
+    @staticmethod
+    def backward(ctx, grad):
+        _, barycentrics, attributes, faces = ctx.saved_tensors
+        wanted = ctx.needs_input_grad[2:4]
+        if torch.is_grad_enabled():  # of a derivative that is to have one itself
+            given = [tensor for tensor, is_wanted in zip((barycentrics, attributes), wanted) if is_wanted]
+            found = iter(torch.autograd.grad(ctx.mixed(barycentrics, attributes, faces), given, grad, create_graph=True))
+        else:
+            arrays = map(_arrays.to_numpy, (*ctx.saved_tensors, grad))
+            gradients = map(torch.from_numpy, _rasterized.interpolated_gradients(*arrays))
+            found = iter([gradient for gradient, is_wanted in zip(gradients, wanted) if is_wanted])
+        return (None, None, *(next(found) if is_wanted else None for is_wanted in wanted), None)
+
+
+def _is_transformed(*tensors):
+    """Within torch.func, or with tangents: the library knows nothing of these."""
+    peek = getattr(getattr(torch._C, "_functorch", None), "peek_interpreter_stack", None)
+    return peek is not None and peek() is not None or \
+        any(forward_ad.unpack_dual(tensor).tangent is not None for tensor in tensors)
+
+
+def interpolate(face_id, barycentrics, attributes, faces, mixed):
+    if _is_transformed(barycentrics, attributes):
+        return mixed(barycentrics, attributes, faces)
+    return _Interpolate.apply(mixed, face_id, barycentrics, attributes, faces)
