@@ -89,10 +89,11 @@ typedef struct dpr_frame_options {
   const char* const*
       gradients; /* [gradient_count], names of the arrays that backward passes may be asked for */
   size_t gradient_count;
+  int defers_image; /* not 0: the image is rendered when it is asked for; samples are there without */
 } dpr_frame_options;
 
 #define DPR_FRAME_OPTIONS_INIT \
-  { sizeof(dpr_frame_options), NULL, 128, 128, NULL, 0, 0, 0, NULL, 0 }
+  { sizeof(dpr_frame_options), NULL, 128, 128, NULL, 0, 0, 0, NULL, 0, 0 }
 
 /* "preset, sigma, ...": the keys of "smoothing" in the scene format; "znear", "zfar" and "cull"; "shading"
  * and "shininess" of lights; "wrap" and "filter" of textures, one word or one for each: "repeat,clamp"; "layers" of

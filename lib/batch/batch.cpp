@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -173,6 +174,7 @@ Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const Batch
   if (own_shapes) shapes = needs_affine ? std::span<const glm::vec3>(vertices_) : vertices;
   renderer.set_shapes(shapes, own_colors ? colors : std::span<const glm::vec3>());
   renderer.set_gradients(request_of(wanted_, needs_affine));
+  impl_of(renderer).wants_samples_alone = options.defers_image;
   renderer.forward();
 }
 
@@ -195,6 +197,7 @@ void Batch::require_image(const NamedArray& array, std::size_t channels) {
 void Batch::read(NamedArrays outputs) {
   Renderer& renderer = frame_.renderer();
   for (const NamedArray& output : outputs) require_image(output, channels_of(output.name));
+  impl_of(renderer).require_image();
   std::vector<AuxiliaryOutputs> auxiliary;
   for (const NamedArray& output : outputs) {
     if (output.name == "image") {
@@ -230,6 +233,7 @@ void Batch::start_gradients(NamedArrays gradients) {
 void Batch::backward(NamedArrays grads, NamedArrays gradients) {
   Renderer& renderer = frame_.renderer();
   start_gradients(gradients);
+  impl_of(renderer).require_image();
   for (const NamedArray& grad : grads) {
     require_image(grad, channels_of(grad.name));
     const auto pixels = grad.rows<const glm::vec4>();
@@ -290,8 +294,11 @@ std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, co
   if (count > k_most_words)
     throw InvalidArgument(argument, std::to_string(count), "at most " + std::to_string(k_most_words));
   std::vector<NamedArray> named;
+  std::set<std::string_view> names;
   for (const dpr_array& array : std::span(arrays, count)) {
     const std::string name = &c::deref(array.name, "name (array)");
+    if (!names.insert(array.name).second)
+      throw InvalidArgument("name (array)", "'" + name + "' twice", "each name once");
     if (array.element < DPR_FLOAT32 || array.element > DPR_INT64)
       throw InvalidArgument("element (" + name + ")", std::to_string(array.element), "a dpr_element");
     if (array.dimensions < 0 || array.dimensions > k_most_dimensions)
@@ -300,6 +307,11 @@ std::vector<NamedArray> to_arrays(const dpr_array* arrays, std::size_t count, co
                      array.data,
                      static_cast<Element>(array.element),
                      {array.shape, array.shape + array.dimensions}});
+    std::size_t room = std::numeric_limits<std::size_t>::max() / sizeof(std::int64_t);
+    for (const std::size_t side : named.back().shape) room /= std::max<std::size_t>(side, 1);
+    if (room == 0)
+      throw InvalidArgument(name + " (array)", text_of(named.back().shape),
+                            "a shape that memory has room for");
     if (named.back().count() > 0 && !array.data) throw InvalidArgument(name, "NULL", "a pointer");
   }
   return named;
@@ -340,7 +352,7 @@ dpr_status dpr_frame_render(const dpr_frame_options* options, const dpr_array* a
     const dpr::batch::RenderSettings settings = dpr::batch::to_settings(given);
     const std::vector<dpr::batch::NamedArray> named = dpr::batch::to_arrays(arrays, count, "arrays");
     const dpr::batch::BatchOptions how{
-        settings, given.is_lit != 0, given.first_view,
+        settings, given.is_lit != 0, given.first_view, given.defers_image != 0,
         dpr::batch::to_words(given.gradients, given.gradient_count, "gradients")};
     auto pool = dpr::batch::RendererPools::of_process().get(given.device ? given.device : "");
     give(frame, std::make_unique<dpr::batch::Batch>(std::move(pool), named, how));

@@ -23,6 +23,7 @@ struct BatchOptions {
   bool is_lit = false;
   /// Views of a larger batch that come before these: sampled noise is that of the larger batch.
   std::size_t first_view = 0;
+  bool defers_image = false;
   /// Names of the arrays whose gradients backward() may be asked for.
   std::vector<std::string> gradients = {};
 };

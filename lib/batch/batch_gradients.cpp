@@ -264,6 +264,7 @@ std::vector<SceneTangent> Batch::moving(std::size_t directions, NamedArrays tang
 }
 
 void Batch::tangent(std::size_t directions, NamedArrays tangents, std::span<glm::vec4> images) {
+  impl_of(frame_.renderer()).require_image();
   glm::vec4* next = images.data();
   for (const Image& image : frame_.renderer().tangent(moving(directions, tangents)))
     next = std::ranges::copy(image.pixels, next).out;

@@ -107,6 +107,7 @@ void interpolate_to(NamedArrays arrays, NamedArrays outputs) {
     const bool are_steps = output.name == "steps";
     if (!are_steps && output.name != "values") refuse(output, "values or steps");
     call.require_values(output, are_steps ? 2 : 1);
+    if (are_steps) require(arrays, "barycentric_steps");
   }
   for (const NamedArray& output : outputs) {
     if (output.name == "steps") {
@@ -125,6 +126,7 @@ void backward(NamedArrays arrays, NamedArrays grads, NamedArrays gradients) {
     const bool are_steps = grad.name == "steps";
     if (!are_steps && grad.name != "values") refuse(grad, "values or steps");
     call.require_values(grad, are_steps ? 2 : 1);
+    if (are_steps) require(arrays, "barycentric_steps");
     const auto numbers = grad.rows<const float>();
     if (are_steps) {
       grad_steps = numbers;

@@ -37,9 +37,9 @@ class TextureCall {
  public:
   TextureCall(NamedArrays arrays, const char* wrap, const char* filter) : arrays_(arrays) {
     find_coordinates();
-    lookup_.border = is_cube() ? Border::cube
-                               : static_cast<Border>(position_of(wrap ? wrap : "repeat", k_borders, "wrap"));
-    const std::size_t chosen = position_of(filter ? filter : "bilinear", k_filters, "filter");
+    const std::size_t border = position_of(wrap ? wrap : "repeat", k_borders, "wrap (texture)");
+    lookup_.border = is_cube() ? Border::cube : static_cast<Border>(border);
+    const std::size_t chosen = position_of(filter ? filter : "bilinear", k_filters, "filter (texture)");
     lookup_.is_level_rounded = chosen == k_mipmap;
     lookup_.filter = lookup_.is_level_rounded ? Filter::trilinear : static_cast<Filter>(chosen);
     lookup_.is_v_up = coordinates_->name == "texcoords";
@@ -254,6 +254,7 @@ dpr_status dpr_texture_map_backward(const dpr_array* arrays, std::size_t count, 
                                   to = to_arrays(gradients, gradient_count, "gradients");
     const TextureCall call(given, wrap, filter);
     call.require_values(grad[0]);
+    dpr::batch::require_finite(grad[0]);
     call.require_like(to);
     call.backward(grad[0].rows<const float>(), to);
   });
@@ -269,6 +270,7 @@ dpr_status dpr_texture_map_tangent(const dpr_array* arrays, std::size_t count, c
     const TextureCall call(given, wrap, filter);
     call.require_values(to[0]);
     call.require_like(moving);
+    for (const NamedArray& array : moving) dpr::batch::require_finite(array);
     call.tangent(moving, to[0].rows<float>());
   });
 }

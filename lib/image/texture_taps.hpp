@@ -45,7 +45,12 @@ OnImage<T> on_cube(const std::array<T, 3>& direction, const std::array<std::arra
   const std::size_t axis = z > std::max(x, y) ? 2 : y > x ? 1 : 0;
   const float sign = value_of(direction[axis]) < 0 ? -1.0F : 1.0F;
   const std::array<std::array<float, 3>, 3> signs{{{-sign, -1, sign}, {1, sign, sign}, {sign, -1, sign}}};
-  const auto turned = [&](const auto& of, std::size_t i) { return T(of(k_axes[axis][i]) * signs[axis][i]); };
+  // The largest coordinate becomes 1 or -1: the square of any length may be no number.
+  constexpr float k_most = 1e37F;
+  const float size = std::fabs(value_of(direction[axis])), scale = size > 0 ? std::min(1 / size, k_most) : 1;
+  const auto turned = [&](const auto& of, std::size_t i) {
+    return T(of(k_axes[axis][i]) * (signs[axis][i] * scale));
+  };
   const auto number = [&](std::size_t i) { return direction[i]; };
   const T depth = value_of(direction[axis]) == 0 ? T(1) : turned(number, 2);
   OnImage<T> place;

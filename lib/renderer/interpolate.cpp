@@ -22,7 +22,9 @@ class Table {
         views_(samples.faces.size() /
                std::max<std::size_t>(of_view_ * static_cast<std::size_t>(samples.layers), 1)) {
     if (views_ == 0 || samples.barycentrics.size() != samples.faces.size())
-      throw InvalidArgument("samples (interpolate)", std::to_string(samples.faces.size()),
+      throw InvalidArgument("samples (interpolate)",
+                            std::to_string(samples.faces.size()) + " faces, " +
+                                std::to_string(samples.barycentrics.size()) + " barycentrics",
                             "what Renderer::samples() returns");
     if (attributes.channels == 0) throw InvalidArgument("channels (interpolate)", "0", "at least 1");
     faces_ = attributes.faces_are_of_views ? rows_of_views(attributes.faces.size(), 1, "faces") : 0;
@@ -32,17 +34,17 @@ class Table {
     const std::size_t rows = row_stride_ != 0 ? row_stride_ : attributes.values.size() / attributes.channels;
     checks::require_numbers(attributes.values,
                             (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
-                            "values (interpolate)");
+                            "attributes (interpolate)");
     for (const std::int32_t face : samples.faces)
       if (face >= 0 && static_cast<std::size_t>(face) >= faces)
         throw InvalidArgument("faces (interpolate)", std::to_string(faces),
-                              "those of the samples, of which one shows face " + std::to_string(face));
+                              "more than " + std::to_string(face) + ", which a sample shows");
     for (std::size_t i = 0; i < attributes.faces.size(); ++i) {
       const uvec3& face = attributes.faces[i];
       const std::uint32_t largest = std::max({face.x, face.y, face.z});
       if (largest >= rows)
         throw InvalidArgument(checks::in(checks::element("faces", i), "interpolate"), std::to_string(largest),
-                              "indices below " + std::to_string(rows) + ", the rows of values");
+                              "indices below " + std::to_string(rows) + ", the rows of attributes");
     }
   }
 

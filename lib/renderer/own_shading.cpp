@@ -261,7 +261,7 @@ std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
   checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
                           "samples (resolve)");
-  std::vector<float> pixels(channels * m.image().size());
+  std::vector<float> pixels(channels * m.pixel_count());
   m.resolve(samples, channels, pixels);
   return pixels;
 }
@@ -273,7 +273,7 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
   if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
   checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
                           "samples (resolve)");
-  checks::require_numbers(grad_pixels, channels * m.image().size(), "grad_pixels (resolve)");
+  checks::require_numbers(grad_pixels, channels * m.pixel_count(), "grad_pixels (resolve)");
   return m.resolve_backward(samples, channels, grad_pixels);
 }
 
@@ -295,7 +295,7 @@ std::vector<float> Renderer::resolve_tangent(std::span<const float> samples, std
   checks::require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
   m.require_tangents(directions);
   if (directions.empty()) return {};
-  std::vector<float> pixels(directions.size() * channels * m.image().size());
+  std::vector<float> pixels(directions.size() * channels * m.pixel_count());
   m.resolve_tangent(samples, channels, sample_tangents, directions, pixels);
   return pixels;
 }

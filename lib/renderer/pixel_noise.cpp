@@ -84,13 +84,18 @@ void PixelNoise::finish_backward(const Blur::Size& size, const BufferRef<cl_floa
   if (by_scale) blur.backward_scale(size, grad_image);
 }
 
-void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
+void PixelNoise::prepare(const ContourInputs& in, const Blur::Size& size,
                          const Buffer<cl_uint>& tile_starts) {
   if (!sampled) blur.find_extents(in.p, tile_starts);
   antialias.cross(in, contour);
+  if (sampled) sampled->draw(size, in.p.first_view);
+}
+
+void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
+                         const Buffer<cl_uint>& tile_starts) {
+  prepare(in, size, tile_starts);
   antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;
-  if (sampled) sampled->draw(size, in.p.first_view);
   blur_forward(size, raster, image, false);
   blur_holds_image_ = true;
 }

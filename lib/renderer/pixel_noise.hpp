@@ -39,6 +39,8 @@ class PixelNoise {
   std::optional<Edges> edges;            // of the scene; made for its first frame
   BackFaces back_faces;                  // of the edges' meshes
 
+  /// What forward() does before it blends: all that smooth() needs.
+  void prepare(const ContourInputs& in, const Blur::Size& size, const Buffer<cl_uint>& tile_starts);
   /// From samples, which are blended in place, to the image; after the antialiasing's find_front() of all
   /// bands. `tile_starts` are the runs of the frame's pairs.
   void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "dpr/error.hpp"
 #include "renderer/frame.hpp"
@@ -148,7 +149,11 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 /// From samples to pixels, once all bands are rendered.
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
-  pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
+  if (defers_image()) {
+    pixel_noise->prepare(contour_inputs(), image_size(), bin.tile_starts);
+  } else {
+    pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
+  }
   seen_layers_ = front_layers();
 }
 
@@ -171,7 +176,7 @@ void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes size
 
 void Renderer::Impl::forward_measured(bool is_whole) {
   last_counts.reset();
-  sample_bands = is_whole ? std::vector<Range>() : cut_samples();
+  sample_bands = is_whole || defers_image() ? std::vector<Range>() : cut_samples();
   find_contours(std::nullopt);
   bin.forward(frame, setup);
   rasterize.cover(frame, setup.triangles, bin, sample_bands.empty());
@@ -228,6 +233,12 @@ void Renderer::Impl::settle() {
   aov_frame = 0;
 }
 
+void Renderer::Impl::require_image() {
+  if (!std::exchange(wants_samples_alone, false) || !pixel_noise) return;
+  require_forward("image");
+  render_again();
+}
+
 void Renderer::Impl::require_whole() {
   if (!sample_bands.empty()) render_again(/*is_whole*/ true);
 }
@@ -247,10 +258,12 @@ void Renderer::Impl::render(const Band& band) {
 }
 
 void Renderer::Impl::shade_and_aggregate() {
-  shade.forward(shade_inputs());
-  if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
-  if (sees_through()) opacity.forward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
-  aggregate.forward(aggregate_inputs(), scene.background);
+  if (!defers_image()) {
+    shade.forward(shade_inputs());
+    if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
+    if (sees_through()) opacity.forward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
+    aggregate.forward(aggregate_inputs(), scene.background);
+  }
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
   pixel_noise->unblend();

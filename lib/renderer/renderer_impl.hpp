@@ -170,6 +170,14 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void require_forward(const char* caller);
   /// Renders the last frame again if its samples are in bands, so that they are whole: whatever the budget.
   void require_whole();
+  std::size_t pixel_count() const {
+    return views.size() * static_cast<std::size_t>(scene.width) * static_cast<std::size_t>(scene.height);
+  }
+  /// Frames of noise on the pixel have no image until it is asked for: samples(), and resolve(), do without.
+  bool wants_samples_alone = false;
+  bool defers_image() const { return wants_samples_alone && pixel_noise; }
+  /// Renders the image of the last frame, if it has none.
+  void require_image();
   /// Image of the last frame: [view][height][width] RGBA.
   const Buffer<cl_float4>& image() const { return pixel_noise ? pixel_noise->image : aggregate.image; }
   /// Held in buffers.

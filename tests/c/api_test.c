@@ -891,6 +891,10 @@ static void test_frame_samples(void) {
   OK(dpr_frame_render(&options, arrays, 4, &frame));
   OK(dpr_frame_read(frame, &image, 1));
   OK(dpr_frame_backward(frame, &grad, 1, &gradient, 1));
+  dpr_frame_destroy(frame);
+  frame = NULL;
+  options.defers_image = 1;
+  OK(dpr_frame_render(&options, arrays, 4, &frame));
   OK(dpr_frame_raster(frame, &raster));
   EXPECT(raster.width == raster.supersampling * SIDE + 2 * raster.margin && raster.height == raster.width);
   count = (size_t)raster.width * (size_t)raster.height;
@@ -926,6 +930,14 @@ static void test_frame_samples(void) {
     for (i = 0; i < 9; ++i) EXPECT(inside[i] == 0);
     REFUSED(dpr_frame_samples(frame, &image, 1), "face_id");
     EXPECT(raster.layers == 1);
+    { /* The image and its gradient are there when they are asked for. */
+      const dpr_array later = {"image", other, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+      gradient.data = inside;
+      OK(dpr_frame_backward(frame, &grad, 1, &gradient, 1));
+      OK(dpr_frame_read(frame, &later, 1));
+      for (i = 0; i < FLOATS; ++i) EXPECT(other[i] == pixels[i]);
+      for (i = 0; i < 9; ++i) EXPECT(inside[i] == wanted_gradient[i]);
+    }
     REFUSED(dpr_frame_samples_backward(frame, samples, 1, &gradient, 1), "barycentrics or depth");
     wrong.shape[2] = SIDE;
     REFUSED(dpr_frame_resolve(frame, &wrong, &resolved), "values");
@@ -1071,7 +1083,7 @@ static void test_own_texture(void) {
     REFUSED(dpr_interpolate(samples, 4, outputs, 1), "faces");
     REFUSED(dpr_interpolate(samples, 5, samples, 1), "values or steps");
     face_id[0] = 1;
-    REFUSED(dpr_interpolate(samples, 5, outputs, 1), "face 1");
+    REFUSED(dpr_interpolate(samples, 5, outputs, 1), "expected more than 1");
     REFUSED(dpr_interpolate_backward(samples, 5, NULL, 1, of_samples, 1), "grads");
     free(face_id), free(numbers);
   }

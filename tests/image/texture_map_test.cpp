@@ -254,6 +254,16 @@ TEST_SUITE("unit") {
       };
       const std::vector<float> of_cube = drawn(6 * k_side * k_side, 0, 1, 9);
       check_derivatives(make, of_cube, {directions.coordinates, {}, {}});
+      if (filter == Filter::nearest) continue;
+      const std::vector<float> ahead{0.5F, 0.3F, 1}, one(1, 1.0F);
+      const std::vector<float> unit = make(of_cube).backward({.coordinates = ahead}, one).coordinates;
+      for (const float length : {1e-25F, 1e25F}) {  // whose squares are no numbers
+        std::vector<float> far = ahead;
+        for (float& number : far) number *= length;
+        const std::vector<float> found = make(of_cube).backward({.coordinates = far}, one).coordinates;
+        for (std::size_t i = 0; i < 3; ++i)
+          CHECK(found[i] * length == doctest::Approx(unit[i]).epsilon(1e-4));
+      }
       if (filter == Filter::trilinear) check_derivatives(make, of_cube, directions);
     }
   }

@@ -238,11 +238,11 @@ TEST_SUITE("pipeline") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {beyond, values, 1}),
                           "faces[1] (interpolate): got 3");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {std::span(faces).first(1), values, 1}),
-                          "face 1");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 2}), "values (interpolate)");
+                          "expected more than 1");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 2}), "attributes (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 0}),
                           "channels (interpolate)");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, bad, 1}), "values (interpolate)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, bad, 1}), "attributes (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate({}, {faces, values, 1}), "samples (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_steps(samples, {faces, values, 1}), "no steps");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate_backward(samples, {faces, values, 1}, {}),

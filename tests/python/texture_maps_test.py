@@ -73,6 +73,29 @@ class TextureMapsTest(unittest.TestCase):
         self.assertGreater(np.std(fine[samples.mask]), 0.1)
         self.assertLess(np.std(coarse[samples.mask]), 0.02)
 
+    def test_faces_of_other_arrays(self):
+        """Two views, and attributes by indices of their own."""
+        at, faces = drawn(5, 6), np.array([[4, 1, 2], [3, 0, 1]], np.int32)
+        samples = dpr.rasterize(self.vertices, self.faces, *self.cameras, width=SIZE, height=SIZE)
+        wanted = samples.interpolate(at, faces), samples.interpolate_steps(at, faces)
+        self.assertGreater(np.abs(wanted[1]).max(), 0)
+        self.assertEqual(samples.interpolate(drawn(4, 0)).shape[-1], 0)
+        if torch is None:
+            return
+        vertices = torch.tensor(self.vertices, requires_grad=True)
+        samples = dpr.rasterize(vertices, self.faces, *self.cameras, width=SIZE, height=SIZE)
+        for own in (faces, faces.tolist(), torch.from_numpy(faces)):
+            for found, values in zip((samples.interpolate(at, own), samples.interpolate_steps(at, own)), wanted):
+                self.assertLess(error(found.detach(), values), 1e-5)
+        # A derivative that has one itself.
+        table = torch.tensor(at, requires_grad=True)
+        sum_of_squares = samples.interpolate(table, faces).square().sum()
+        (first,) = torch.autograd.grad(sum_of_squares, table, create_graph=True)
+        (second,) = torch.autograd.grad(first.sum(), table)
+        ones = samples.interpolate(torch.ones_like(table), faces)
+        samples.interpolate(table, faces).backward(2 * ones)
+        self.assertLess(error(second, table.grad), 1e-5)
+
     def test_gradients_of_every_array(self):
         for cube in (False, True):
             texels = drawn(6, 8, 8, 2) if cube else drawn(7, 9, 2)
@@ -115,8 +138,14 @@ class TextureMapsTest(unittest.TestCase):
                 (r"texcoords \(dpr.texture\): got nan", lambda: dpr.texture(self.texels, uv * np.nan))):
             with self.assertRaisesRegex(ValueError, message):
                 call()
-        with self.assertRaisesRegex(TypeError, "texels"):
-            dpr.texture("texels", uv)
+        for name, arguments, words in (("texels", ("texels", uv), {}), ("texels", (None, uv), {}),
+                                       ("texcoords", (self.texels, None), {}), ("wrap", (self.texels, uv), {"wrap": None})):
+            with self.assertRaisesRegex(TypeError, name):
+                dpr.texture(*arguments, **words)
+        with self.assertRaisesRegex(ValueError, "values .*got nan"):
+            dpr.texture_with_vjp(self.texels, uv)[1](np.full((1, 2, 3, 3), np.nan))
+        with self.assertRaisesRegex(ValueError, "expected repeat"):
+            dpr.texture(drawn(6, 4, 4, 2), drawn(1, 2, 3, 3), wrap="round")
 
 
 if __name__ == "__main__":

@@ -54,12 +54,13 @@ def words(texts):
     return (ctypes.c_char_p * len(texts))(*(text.encode() for text in texts)), len(texts)
 
 
-def options_of(spec, settings=(), first_view=0, gradients=()):
+def options_of(spec, settings=(), first_view=0, gradients=(), defers_image=False):
     """Options, which keep their words alive."""
     options = _library.Options(ctypes.sizeof(_library.Options), spec.device.encode(), spec.width, spec.height)
     options.settings, options.setting_count = words([*spec.settings, *settings])
     options.is_lit, options.first_view = spec.is_lit, first_view
     options.gradients, options.gradient_count = words(gradients)
+    options.defers_image = defers_image
     return options
 
 

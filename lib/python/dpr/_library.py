@@ -53,7 +53,8 @@ class Options(ctypes.Structure):
     _fields_ = [("size", ctypes.c_size_t), ("device", ctypes.c_char_p), ("width", ctypes.c_int),
                 ("height", ctypes.c_int), ("settings", ctypes.POINTER(ctypes.c_char_p)),
                 ("setting_count", ctypes.c_size_t), ("is_lit", ctypes.c_int), ("first_view", ctypes.c_size_t),
-                ("gradients", ctypes.POINTER(ctypes.c_char_p)), ("gradient_count", ctypes.c_size_t)]
+                ("gradients", ctypes.POINTER(ctypes.c_char_p)), ("gradient_count", ctypes.c_size_t),
+                ("defers_image", ctypes.c_int)]
 
 
 class Raster(ctypes.Structure):

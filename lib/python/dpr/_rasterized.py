@@ -125,7 +125,7 @@ def raster_of(spec):
 def _rendered(spec, arrays, wanted):
     """(arrays of one frame, the frame) of all the call's meshes."""
     def framed(lot, view=None):
-        return _frames.Frame(_frames.options_of(spec, lot.settings, 0, lot.names(wanted)), lot.named, view)
+        return _frames.Frame(_frames.options_of(spec, lot.settings, 0, lot.names(wanted), True), lot.named, view)
 
     frames = _frames.frames_of(spec.parts)
     alone = [_merged.Single(*frame, arrays, True) for frame in frames]

@@ -71,7 +71,7 @@ class Samples:
         [N, F, 3] as those of rasterize(), indices of the attributes for the corners of the mesh's faces, where they have
         some of their own. Of a list of meshes both are lists too. Raises ValueError for other shapes and indices."""
         attributes, faces = self._tables_of(attributes, faces)
-        if not self._is_of_jax and 0 not in (*faces.shape, attributes.shape[-2]):
+        if not self._is_of_jax and 0 not in (*faces.shape, *attributes.shape[-2:]):
             if self._tensors is not None:
                 from . import _interpolate
                 return _interpolate.interpolate(self.face_id, self.barycentrics, attributes, faces, self._mixed)
@@ -100,6 +100,8 @@ class Samples:
             if len(counts) > 1 and faces is None and len(getattr(attributes, "shape", ())) == 2:
                 _arrays.fail(ValueError, "attributes", list(attributes.shape), f"a list of {len(self._meshes)}", "dpr.Samples")
             attributes, faces = self._table("", attributes, faces, max(counts), tuple(self._faces.shape))
+        if faces is not None and self._tensors is not None and not self._is_of_jax:
+            faces = sys.modules["torch"].as_tensor(faces).long()
         return attributes, self._faces if faces is None else faces
 
     def _at_corners(self, attributes, faces):

@@ -70,7 +70,10 @@ def _checked(texels, texcoords, steps, levels, wrap, filter, where):
     """(lookup, arrays by argument, as the library has them)"""
     given = {"texcoords": texcoords, "steps": steps, "levels": levels, "texels": texels}
     arrays = {name: _arrays.converted(name, _arrays.from_numbers(array), where=where)
-              for name, array in given.items() if array is not None}
+              for name, array in given.items() if array is not None or name.startswith("tex")}
+    for name, word in (("wrap", wrap), ("filter", filter)):
+        if not isinstance(word, str):
+            _arrays.fail(TypeError, name, repr(word), "a word", where)
     for name, array in arrays.items():
         if _arrays.module_of(array) == "torch" and array.device.type != "cpu":
             _arrays.fail(ValueError, name, f"a tensor on {array.device}", "one on the CPU", where)
@@ -106,8 +109,9 @@ def texture(texels: Array, texcoords: Array, *, steps: Optional[Array] = None, l
     wrap       "repeat", "mirror", "clamp" or "zero"; cube maps go on beyond the borders of their faces
     filter     "nearest", "bilinear", "trilinear", or "mipmap", which reads one smaller version, and does not blend two
 
-    PyTorch and JAX have derivatives in both modes by all arrays; texture_with_vjp() has those of others. Raises ValueError
-    for other shapes and words, and for what is not finite. Works on the host."""
+    Arrays and lists of floating-point numbers; the result is float32. PyTorch and JAX have derivatives in both modes by all
+    arrays; texture_with_vjp() has those of others. Raises ValueError for other shapes and words, and for what is not finite.
+    Works on the host."""
     lookup, arrays = _checked(texels, texcoords, steps, levels, wrap, filter, "dpr.texture")
     kinds = {_arrays.module_of(array) for array in arrays.values()}
     if "torch" in kinds:
