@@ -11,11 +11,11 @@
 extern "C" {
 #endif
 
-/* Of frames with the preset "pixel": what the samples of the rigid image show, and images of the values that the caller
- * finds for them. Of frames without lights; colours and textures have no
- * part in it. The samples of a view are a raster from the top left, `supersampling` a pixel and axis, with a margin
- * around the image. They show the nearest surface alone, or by the setting "layers=L" the nearest L, for values that
- * blend these as see-through: contours count then unless L surfaces hide them. */
+/* Of frames with the preset "pixel" and without lights: what the samples of the rigid image show, and images of the
+ * values that the caller finds for them; colours and textures have no part in it. The samples of a view are a raster
+ * from the top left, `supersampling` a pixel and axis, with a margin around the image. They show the nearest surface
+ * alone, or by the setting "layers=L" the nearest L, for values that blend these as see-through: contours count then
+ * unless L surfaces hide them. */
 typedef struct dpr_raster {
   int width, height, supersampling, margin; /* samples */
   int layers;
@@ -79,8 +79,8 @@ DPR_API dpr_status dpr_interpolate_tangent(const dpr_array* arrays, size_t count
  *   texels[1], ...       instead of smaller versions that are made here: each half as large, rounded down
  *
  * filter: "nearest", "bilinear" (NULL), "trilinear", which blends two smaller versions by steps and levels, or
- * "mipmap", which reads the one next to the level. wrap: "repeat" (NULL), "mirror", "clamp" or "zero"; cube maps go on beyond the
- * borders of their faces. */
+ * "mipmap", which reads the one next to the level. wrap: "repeat" (NULL), "mirror", "clamp" or "zero"; cube maps go on
+ * beyond the borders of their faces. */
 DPR_API dpr_status dpr_texture_map(const dpr_array* arrays, size_t count, const char* wrap,
                                    const char* filter, const dpr_array* values);
 /* The gradients of sum <grad_values, values>, of the arrays that `gradients` names. */

@@ -9,19 +9,27 @@
 
 namespace dpr {
 
+/// Things of a thread, at least: starting one takes as long as some hundred of them.
+inline constexpr std::size_t k_least_of_thread = 1U << 14U;
+
 /// Calls `function(first, last)` with ranges of all of `count` things, some at the same time where there are many.
 template <class Function>
 void in_parallel(std::size_t count, const Function& function) {
-  constexpr std::size_t k_least =
-      1U << 14U;  // of a thread: starting one takes as long as some hundred of them
   const std::size_t parts =
-      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least + 1);
+      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / k_least_of_thread + 1);
   std::vector<std::future<void>> others;
   for (std::size_t i = 1; i < parts; ++i)
     others.push_back(std::async(
         [&function, first = count * i / parts, last = count * (i + 1) / parts] { function(first, last); }));
   function(std::size_t{0}, count / parts);
   for (std::future<void>& other : others) other.get();
+}
+
+/// Calls `function()`, which does so many things: on a thread of its own, or when the result is waited for.
+template <class Function>
+std::future<void> aside(std::size_t count, const Function& function) {
+  const bool is_small = count < k_least_of_thread;
+  return std::async(is_small ? std::launch::deferred : std::launch::async | std::launch::deferred, function);
 }
 
 }  // namespace dpr

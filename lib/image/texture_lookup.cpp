@@ -1,6 +1,5 @@
 #include "image/texture_lookup.hpp"
 
-#include <future>
 #include <numeric>
 
 #include "base/parallel.hpp"
@@ -98,7 +97,7 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
     };
     if (!moves) return gradients.texels.empty() ? void() : gather();
     std::future<void> gathered;
-    if (!gradients.texels.empty()) gathered = std::async(gather);
+    if (!gradients.texels.empty()) gathered = aside(count, gather);
     using T = taps::Derived<Shape::k_inputs>;
     in_parallel(count, [&](std::size_t first, std::size_t last) {
       for_each_place<Shape, T>(

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <future>
 #include <string>
 
 #include "base/checks.hpp"
@@ -170,7 +169,7 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
       }
     }
   };
-  std::future<void> gathered = std::async(gather);
+  std::future<void> gathered = aside(table.count(), gather);
   in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i) {
       if (table.is_empty(i)) continue;

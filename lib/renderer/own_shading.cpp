@@ -1,6 +1,7 @@
 // Noise on the pixel around shading of the caller's own: what the samples show, and images of their colours.
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "base/checks.hpp"
 #include "renderer/renderer_impl.hpp"
@@ -58,6 +59,12 @@ void Renderer::Impl::require_samples(const char* caller) {
     throw InvalidArgument(std::string("lights (") + caller + ")",
                           scene.lights ? "a scene with lights" : "colours by geometry",
                           "none: the shading is the caller's");
+}
+
+void Renderer::Impl::require_image() {
+  if (!std::exchange(wants_samples_alone, false) || !pixel_noise) return;
+  require_forward("image");
+  render_again();
 }
 
 void Renderer::Impl::find_samples() {

@@ -233,12 +233,6 @@ void Renderer::Impl::settle() {
   aov_frame = 0;
 }
 
-void Renderer::Impl::require_image() {
-  if (!std::exchange(wants_samples_alone, false) || !pixel_noise) return;
-  require_forward("image");
-  render_again();
-}
-
 void Renderer::Impl::require_whole() {
   if (!sample_bands.empty()) render_again(/*is_whole*/ true);
 }
@@ -267,14 +261,6 @@ void Renderer::Impl::shade_and_aggregate() {
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
   pixel_noise->unblend();
-}
-
-/// Renders the last frame again if its opaque surfaces hide what derivatives by their opacities need.
-void Renderer::Impl::follow_opacities() {
-  if (opacity.is_bounded()) return;
-  follows_opacities_ = true;
-  render_again();
-  follows_opacities_ = false;
 }
 
 Buffer<cl_float4>& Renderer::Impl::room_for_grad_images(std::size_t pixels) {

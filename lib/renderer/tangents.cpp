@@ -127,6 +127,14 @@ std::vector<cl_float4> joined(std::span<const SceneTangent> directions, std::siz
 
 }  // namespace
 
+/// Renders the last frame again if its opaque surfaces hide what derivatives by their opacities need.
+void Renderer::Impl::follow_opacities() {
+  if (opacity.is_bounded()) return;
+  follows_opacities_ = true;
+  render_again();
+  follows_opacities_ = false;
+}
+
 void Renderer::Impl::upload_directions(std::span<const SceneTangent> directions) {
   const std::size_t count = directions.size(), meshes = scene.meshes.size();
   std::vector<shared::ViewTangent> of_views(count * views.size());

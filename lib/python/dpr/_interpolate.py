@@ -6,7 +6,7 @@ from . import _arrays, _rasterized
 
 
 class _Interpolate(torch.autograd.Function):
-    """(formula, samples' faces, barycentrics, attributes, faces) to values. The formula is the same of PyTorch's operations."""
+    """(formula, samples' faces, barycentrics, attributes, faces) to values. The formula is the same in PyTorch's operations."""
 
     @staticmethod
     def forward(ctx, mixed, face_id, barycentrics, attributes, faces):
