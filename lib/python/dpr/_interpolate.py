@@ -9,10 +9,10 @@ class _Interpolate(torch.autograd.Function):
     """(formula, samples' faces, barycentrics, attributes, faces) to values. The formula is the same in PyTorch's operations."""
 
     @staticmethod
-    def forward(ctx, mixed, face_id, barycentrics, attributes, faces):
+    def forward(ctx, mixed, *tensors):
         ctx.mixed = mixed
-        ctx.save_for_backward(face_id, barycentrics, attributes, faces)
-        return torch.from_numpy(_rasterized.interpolated(*map(_arrays.to_numpy, ctx.to_save)))
+        ctx.save_for_backward(*tensors)
+        return torch.from_numpy(_rasterized.interpolated(*map(_arrays.to_numpy, tensors)))
 
     @staticmethod
     def backward(ctx, grad):
