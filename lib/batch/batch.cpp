@@ -352,8 +352,8 @@ dpr_status dpr_frame_render(const dpr_frame_options* options, const dpr_array* a
     const dpr::batch::RenderSettings settings = dpr::batch::to_settings(given);
     const std::vector<dpr::batch::NamedArray> named = dpr::batch::to_arrays(arrays, count, "arrays");
     const dpr::batch::BatchOptions how{
-        settings, given.is_lit != 0, given.first_view, given.defers_image != 0,
-        dpr::batch::to_words(given.gradients, given.gradient_count, "gradients")};
+        settings, given.is_lit != 0, given.first_view,
+        dpr::batch::to_words(given.gradients, given.gradient_count, "gradients"), given.defers_image != 0};
     auto pool = dpr::batch::RendererPools::of_process().get(given.device ? given.device : "");
     give(frame, std::make_unique<dpr::batch::Batch>(std::move(pool), named, how));
   });

@@ -23,9 +23,10 @@ struct BatchOptions {
   bool is_lit = false;
   /// Views of a larger batch that come before these: sampled noise is that of the larger batch.
   std::size_t first_view = 0;
-  bool defers_image = false;
   /// Names of the arrays whose gradients backward() may be asked for.
   std::vector<std::string> gradients = {};
+  /// True if the image is rendered when it is asked for.
+  bool defers_image = false;
 };
 
 /// Gradients that the renderer computes for these arrays; those of views' matrices by way of the positions where any

@@ -109,7 +109,7 @@ Found rendered(const Arrays& arrays, const RenderSettings& settings, std::size_t
   std::vector<std::string> wanted{"vertices", "colors"};
   if (is_lit) wanted.emplace_back("lights.point");
   if (fades) wanted.emplace_back("opacities");
-  Batch batch(RendererPools::of_process().get(""), arrays.named, {settings, is_lit, 0, false, wanted});
+  Batch batch(RendererPools::of_process().get(""), arrays.named, {settings, is_lit, 0, wanted});
   Found found;
   found.image.resize(views * side * side * 4);
   const std::vector<std::size_t> pixels{views, side, side, 4};
