@@ -2,7 +2,7 @@
 #include "renderer/interpolate.hpp"
 
 #include <algorithm>
-#include <optional>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -65,11 +65,6 @@ class InterpolateCall {
   void require_at_samples(const NamedArray& array, std::size_t channels, const std::string& expected) const {
     const std::vector<std::size_t>& size = face_id_.shape;
     require_floats(array, {size[0], size[1], size[2], channels}, expected);
-  }
-
-  static void require_like(const NamedArray& array, const NamedArray& other) {
-    if (array.element != Element::float32 || array.shape != other.shape)
-      throw InvalidArgument(argument(array), text_of(array.shape), text_of(other.shape) + " of float32");
   }
 
   void read_samples(const NamedArray* steps) {

@@ -73,6 +73,11 @@ const NamedArray& require(NamedArrays arrays, std::string_view name) {
   throw InvalidArgument(std::string(name) + " (batch)", "none", "an array of this name");
 }
 
+void require_like(const NamedArray& array, const NamedArray& other) {
+  if (array.element != Element::float32 || array.shape != other.shape)
+    throw InvalidArgument(argument(array), text_of(array.shape), text_of(other.shape) + " of float32");
+}
+
 void require_form(const NamedArray& array, Element element, std::initializer_list<Shape> shapes,
                   const std::string& expected) {
   if (array.element != element)

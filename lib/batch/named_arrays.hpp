@@ -49,6 +49,9 @@ void require_form(const NamedArray& array, Element element, std::initializer_lis
 /// The same for floats of one shape.
 void require_floats(const NamedArray& array, Shape shape, const std::string& expected);
 
+/// Throws InvalidArgument unless these are floats of the other's shape.
+void require_like(const NamedArray& array, const NamedArray& other);
+
 /// Throws InvalidArgument unless these are whole numbers of either type, [F, 3], of several views
 /// [views, F, 3].
 void require_triples(const NamedArray& array, std::size_t views = 1);

@@ -65,12 +65,8 @@ class TextureCall {
   }
 
   /// Throws unless these are named and shaped as what the call has.
-  void require_like(NamedArrays others) const {
-    for (const NamedArray& other : others) {
-      const NamedArray& own = require(arrays_, other.name);
-      if (other.element != Element::float32 || other.shape != own.shape)
-        throw InvalidArgument(argument(other), text_of(other.shape), text_of(own.shape) + " of float32");
-    }
+  void require_own(NamedArrays others) const {
+    for (const NamedArray& other : others) require_like(other, require(arrays_, other.name));
   }
 
   void values(std::span<float> to) const {
@@ -255,7 +251,7 @@ dpr_status dpr_texture_map_backward(const dpr_array* arrays, std::size_t count, 
     const TextureCall call(given, wrap, filter);
     call.require_values(grad[0]);
     dpr::batch::require_finite(grad[0]);
-    call.require_like(to);
+    call.require_own(to);
     call.backward(grad[0].rows<const float>(), to);
   });
 }
@@ -269,7 +265,7 @@ dpr_status dpr_texture_map_tangent(const dpr_array* arrays, std::size_t count, c
                                   to = to_arrays(values, 1, "values");
     const TextureCall call(given, wrap, filter);
     call.require_values(to[0]);
-    call.require_like(moving);
+    call.require_own(moving);
     for (const NamedArray& array : moving) dpr::batch::require_finite(array);
     call.tangent(moving, to[0].rows<float>());
   });

@@ -56,6 +56,14 @@ void for_each_place(const TextureLookup& texture, const TexturePlaces& places, s
   }
 }
 
+/// The same of all places, on the processor's threads.
+template <class Shape, class T, class Function>
+void for_all_places(const TextureLookup& texture, const TexturePlaces& places, const Function& function) {
+  in_parallel(texture.count(places), [&](std::size_t first, std::size_t last) {
+    for_each_place<Shape, T>(texture, places, first, last, function);
+  });
+}
+
 bool has_level(const TextureLookup& texture, const TexturePlaces& places) {
   return texture.levels.size() > 1 && (!places.steps.empty() || !places.levels.empty());
 }
@@ -65,17 +73,14 @@ bool has_level(const TextureLookup& texture, const TexturePlaces& places) {
 void look_up(const TextureLookup& texture, const TexturePlaces& places, std::span<float> values) {
   const std::size_t channels = texture.channels;
   std::ranges::fill(values, 0.0F);
-  with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
-    in_parallel(texture.count(places), [&](std::size_t first, std::size_t last) {
-      for_each_place<Shape, float>(
-          texture, places, first, last, [&](std::size_t k, const taps::Taps<float>& mixture) {
-            for (const taps::Tap<float>& tap : mixture) {
-              const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
-              for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
-            }
-          });
-    });
-  });
+  const auto read = [&](std::size_t k, const taps::Taps<float>& mixture) {
+    for (const taps::Tap<float>& tap : mixture) {
+      const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
+      for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
+    }
+  };
+  with_form(texture, has_level(texture, places),
+            [&]<class Shape>(Shape) { for_all_places<Shape, float>(texture, places, read); });
 }
 
 void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
@@ -83,36 +88,30 @@ void look_up_backward(const TextureLookup& texture, const TexturePlaces& places,
   const std::size_t channels = texture.channels, count = texture.count(places);
   const bool moves = texture.filter != Filter::nearest &&
                      !(gradients.coordinates.empty() && gradients.steps.empty() && gradients.levels.empty());
+  const auto to_texels = [&](std::size_t k, const taps::Taps<float>& mixture) {
+    for (const taps::Tap<float>& tap : mixture) {
+      float* grad = &gradients.texels[tap.level][channels * tap.texel];
+      for (std::size_t c = 0; c < channels; ++c) grad[c] += tap.weight * grad_values[channels * k + c];
+    }
+  };
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     // Places share texels: one thread gathers these, in order.
-    const auto gather = [&] {
-      for_each_place<Shape, float>(texture, places, 0, count,
-                                   [&](std::size_t k, const taps::Taps<float>& mixture) {
-                                     for (const taps::Tap<float>& tap : mixture) {
-                                       float* grad = &gradients.texels[tap.level][channels * tap.texel];
-                                       for (std::size_t c = 0; c < channels; ++c)
-                                         grad[c] += tap.weight * grad_values[channels * k + c];
-                                     }
-                                   });
-    };
+    const auto gather = [&] { for_each_place<Shape, float>(texture, places, 0, count, to_texels); };
     if (!moves) return gradients.texels.empty() ? void() : gather();
     std::future<void> gathered;
     if (!gradients.texels.empty()) gathered = aside(count, gather);
     using T = taps::Derived<Shape::k_inputs>;
-    in_parallel(count, [&](std::size_t first, std::size_t last) {
-      for_each_place<Shape, T>(
-          texture, places, first, last, [&](std::size_t k, const taps::Taps<T>& mixture) {
-            typename T::DerType by_input = T::DerType::Zero();
-            for (const taps::Tap<T>& tap : mixture) {
-              const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
-              by_input += std::inner_product(texel, texel + channels, &grad_values[channels * k], 0.0F) *
-                          tap.weight.derivatives();
-            }
-            for (int i = 0; i < Shape::k_inputs; ++i)
-              at_input<Shape::k_dimensions>(gradients, k, i, [&](std::span<float> of, std::size_t at) {
-                if (!of.empty()) of[at] += by_input[i];
-              });
-          });
+    for_all_places<Shape, T>(texture, places, [&](std::size_t k, const taps::Taps<T>& mixture) {
+      typename T::DerType by_input = T::DerType::Zero();
+      for (const taps::Tap<T>& tap : mixture) {
+        const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
+        by_input += std::inner_product(texel, texel + channels, &grad_values[channels * k], 0.0F) *
+                    tap.weight.derivatives();
+      }
+      for (int i = 0; i < Shape::k_inputs; ++i)
+        at_input<Shape::k_dimensions>(gradients, k, i, [&](std::span<float> of, std::size_t at) {
+          if (!of.empty()) of[at] += by_input[i];
+        });
     });
     if (gathered.valid()) gathered.get();
   });
@@ -124,23 +123,19 @@ void look_up_tangent(const TextureLookup& texture, const TexturePlaces& places, 
   std::ranges::fill(tangents, 0.0F);
   with_form(texture, has_level(texture, places), [&]<class Shape>(Shape) {
     using T = taps::Derived<Shape::k_inputs>;
-    in_parallel(texture.count(places), [&](std::size_t first, std::size_t last) {
-      for_each_place<Shape, T>(texture, places, first, last,
-                               [&](std::size_t k, const taps::Taps<T>& mixture) {
-                                 typename T::DerType speed;
-                                 for (int i = 0; i < Shape::k_inputs; ++i)
-                                   speed[i] = at_input<Shape::k_dimensions>(moving, k, i, number_of);
-                                 for (const taps::Tap<T>& tap : mixture) {
-                                   const std::size_t at = channels * tap.texel;
-                                   const float change = (tap.weight.derivatives() * speed).sum();
-                                   for (std::size_t c = 0; c < channels; ++c) {
-                                     float& tangent = tangents[channels * k + c];
-                                     tangent += change * texture.levels[tap.level].texels[at + c];
-                                     if (!moving_texels.empty())
-                                       tangent += tap.weight.value() * moving_texels[tap.level][at + c];
-                                   }
-                                 }
-                               });
+    for_all_places<Shape, T>(texture, places, [&](std::size_t k, const taps::Taps<T>& mixture) {
+      typename T::DerType speed;
+      for (int i = 0; i < Shape::k_inputs; ++i)
+        speed[i] = at_input<Shape::k_dimensions>(moving, k, i, number_of);
+      for (const taps::Tap<T>& tap : mixture) {
+        const std::size_t first = channels * tap.texel;
+        const float change = (tap.weight.derivatives() * speed).sum();
+        for (std::size_t c = 0; c < channels; ++c) {
+          float& tangent = tangents[channels * k + c];
+          tangent += change * texture.levels[tap.level].texels[first + c];
+          if (!moving_texels.empty()) tangent += tap.weight.value() * moving_texels[tap.level][first + c];
+        }
+      }
     });
   });
 }

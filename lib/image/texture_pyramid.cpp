@@ -9,7 +9,7 @@ namespace {
 /// The texels of a row that the next smaller version's texel is the mean of: at most four, as a row shrinks to a half
 /// or a third.
 struct Mean {
-  int first;
+  std::size_t first;
   std::array<float, 4> weights;
 };
 
@@ -18,11 +18,11 @@ std::vector<Mean> means_of(int from, int to) {
   std::vector<Mean> means;
   for (int i = 0; i < to; ++i) {
     const double begin = i * width, end = begin + width;
-    Mean mean{static_cast<int>(begin), {}};
-    for (int k = 0; k < 4; ++k) {
+    Mean mean{static_cast<std::size_t>(begin), {}};
+    for (std::size_t k = 0; k < mean.weights.size(); ++k) {
       const double least = std::max(begin, static_cast<double>(mean.first + k)),
                    most = std::min(end, static_cast<double>(mean.first + k) + 1);
-      mean.weights[static_cast<std::size_t>(k)] = static_cast<float>(std::max(most - least, 0.0) / width);
+      mean.weights[k] = static_cast<float>(std::max(most - least, 0.0) / width);
     }
     means.push_back(mean);
   }
