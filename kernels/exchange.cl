@@ -22,25 +22,31 @@ kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 t
   }
 }
 
-/// Vectors of three floats to rows of four, the last 0, of which the first is row `first`; and back. One work-item per
-/// vector: what exchange_vectors does for one layout, several times as fast on CPUs.
-/// in   count   vectors
-/// in   packed  float[3 count]
-/// out  rows    float4[first + count]
-kernel void exchange_unpack(const uint count, const uint first, global const float* restrict packed,
-                            global float4* restrict rows) {
-  const uint i = (uint)get_global_id(0);
-  if (i < count) rows[first + i] = (float4)(packed[3 * i], packed[3 * i + 1], packed[3 * i + 2], 0.0f);
-}
-
-kernel void exchange_pack(const uint count, const uint first, global const float4* restrict rows,
-                          global float* restrict packed) {
+/// Vectors of one to four floats to rows of four, 0 behind them; and back. One work-item per vector: what exchange_vectors
+/// does for such layouts, several times as fast on CPUs.
+/// in   count     vectors
+/// in   first     the first row
+/// in   layout    uint4  of `packed`, as exchange_vectors has it, whose groups are one vector
+/// in   packed    float[...], as integers
+/// out  rows      float4[first + count], as integers
+kernel void exchange_unpack(const uint count, const uint first, const uint4 layout,
+                            global const uint* restrict packed, global uint4* restrict rows) {
   const uint i = (uint)get_global_id(0);
   if (i >= count) return;
-  const float4 row = rows[first + i];
-  packed[3 * i] = row.x;
-  packed[3 * i + 1] = row.y;
-  packed[3 * i + 2] = row.z;
+  global const uint* in = packed + layout.x + (size_t)i * layout.y;
+  rows[first + i] = (uint4)(in[0], layout.w > 1 ? in[1] : 0, layout.w > 2 ? in[2] : 0, layout.w > 3 ? in[3] : 0);
+}
+
+kernel void exchange_pack(const uint count, const uint first, const uint4 layout,
+                          global const uint4* restrict rows, global uint* restrict packed) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= count) return;
+  global uint* out = packed + layout.x + (size_t)i * layout.y;
+  const uint4 row = rows[first + i];
+  out[0] = row.x;
+  if (layout.w > 1) out[1] = row.y;
+  if (layout.w > 2) out[2] = row.z;
+  if (layout.w > 3) out[3] = row.w;
 }
 
 static inline float4 finite_row(global const float* row) {

@@ -115,19 +115,18 @@ void interpolate_to(NamedArrays arrays, NamedArrays outputs) {
 
 void backward(NamedArrays arrays, NamedArrays grads, NamedArrays gradients) {
   const InterpolateCall call(arrays);
-  std::vector<float> grad_values(call.samples().faces.size() * call.attributes().channels);
-  std::span<const float> grad_steps;
+  std::span<const float> grad_values, grad_steps;
   for (const NamedArray& grad : grads) {
     const bool are_steps = grad.name == "steps";
     if (!are_steps && grad.name != "values") refuse(grad, "values or steps");
     call.require_values(grad, are_steps ? 2 : 1);
     if (are_steps) require(arrays, "barycentric_steps");
-    const auto numbers = grad.rows<const float>();
-    if (are_steps) {
-      grad_steps = numbers;
-    } else {
-      grad_values.assign(numbers.begin(), numbers.end());
-    }
+    (are_steps ? grad_steps : grad_values) = grad.rows<const float>();
+  }
+  std::vector<float> none;
+  if (grad_values.empty()) {
+    none.resize(call.samples().faces.size() * call.attributes().channels);
+    grad_values = none;
   }
   for (const NamedArray& gradient : gradients) {
     if (gradient.name == "attributes") {

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "base/checks.hpp"
+#include "base/parallel.hpp"
 #include "batch/batch.hpp"
 #include "batch/inputs.hpp"
 #include "c/handles.hpp"
@@ -69,18 +71,30 @@ void Batch::read_samples(NamedArrays samples) {
                    "face_id, barycentrics, depth or barycentric_steps");
     require_samples(array, 1);
   }
-  const NamedArray* const steps = find(samples, "barycentric_steps");
-  const Samples found = frame_.renderer().samples(steps != nullptr);
-  if (steps) std::ranges::copy(found.steps, steps->rows<vec4>().begin());
+  Renderer::Impl& m = impl_of(frame_.renderer());
+  m.require_samples("own shading");
+  m.find_samples();
+  if (const NamedArray* const steps = find(samples, "barycentric_steps")) {
+    m.surface_samples->find_steps(m.frame, m.setup.triangles, m.clip.faces);
+    m.surface_samples->steps.download(steps->rows<cl_float4>());
+  }
+  const MappedRead faces(m.surface_samples->faces);
+  const MappedRead places(m.surface_samples->places);
+  const auto fill = [&]<class Value>(const NamedArray& array, Value&& value) {
+    const std::span out(static_cast<std::decay_t<decltype(value(0))>*>(array.data), faces.size());
+    in_parallel(out.size(), [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) out[i] = value(i);
+    });
+  };
   for (const NamedArray& array : samples) {
-    if (array.name == "face_id") std::ranges::copy(found.faces, static_cast<std::int64_t*>(array.data));
-    if (array.name == "depth") std::ranges::copy(found.depths, array.rows<float>().begin());
+    if (array.name == "face_id")
+      fill(array, [&](std::size_t i) { return faces[i] == DPR_NO_FACE ? -1 : std::int64_t{faces[i]}; });
+    if (array.name == "depth") fill(array, [&](std::size_t i) { return places[i].s[2]; });
     if (array.name != "barycentrics") continue;
-    const std::span<glm::vec3> out = array.rows<glm::vec3>();
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      const glm::vec2 b = found.barycentrics[i];
-      out[i] = found.faces[i] < 0 ? glm::vec3(0.0F) : glm::vec3(1 - b.x - b.y, b.x, b.y);
-    }
+    fill(array, [&](std::size_t i) {
+      const float first = places[i].s[0], second = places[i].s[1];
+      return faces[i] == DPR_NO_FACE ? glm::vec3(0.0F) : glm::vec3(1 - first - second, first, second);
+    });
   }
 }
 
@@ -107,31 +121,38 @@ void Batch::samples_backward(NamedArrays grads, NamedArrays gradients) {
   const dpr_raster size = raster();
   const std::size_t count = static_cast<std::size_t>(size.layers) * renderer.views().size() *
                             static_cast<std::size_t>(size.height) * static_cast<std::size_t>(size.width);
-  std::vector<glm::vec2> barycentrics(count);
-  std::vector<float> depths(count);
+  std::span<const float> depths;
+  std::span<const glm::vec3> barycentrics;
   for (const NamedArray& grad : grads) {
     require_one_of(grad, {"barycentrics", "depth"}, "barycentrics or depth: the others have no gradients");
     const std::size_t numbers = grad.name == "depth" ? count : k_corners * count;
     if (grad.element != Element::float32 || grad.count() != numbers)
       throw InvalidArgument(argument(grad), text_of(grad.shape), std::to_string(numbers) + " floats");
+    checks::require_numbers({static_cast<const float*>(grad.data), numbers}, numbers, "grad_" + grad.name);
     if (grad.name == "depth") {
-      std::ranges::copy(grad.rows<const float>(), depths.begin());
-      continue;
+      depths = grad.rows<const float>();
+    } else {
+      barycentrics = grad.rows<const glm::vec3>();
     }
-    std::ranges::transform(grad.rows<const glm::vec3>(), barycentrics.begin(),
-                           [](const glm::vec3& g) { return glm::vec2(g.y - g.x, g.z - g.x); });
   }
   renderer.set_gradients(request_of(wanted_, true));
-  SceneGradient found = renderer.samples_backward(barycentrics, depths);
+  SceneGradient found = impl_of(renderer).samples_backward([&](std::span<cl_float4> places) {
+    in_parallel(count, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        const glm::vec3 g = barycentrics.empty() ? glm::vec3(0) : barycentrics[i];
+        places[i] = {{g.y - g.x, g.z - g.x, depths.empty() ? 0 : depths[i], 0}};
+      }
+    });
+  });
   add_gradients(found, true, gradients);
 }
 
 void Batch::resolve(const NamedArray& values, const NamedArray& images) {
   require_values(values, true, nullptr);
   require_values(images, false, &values);
-  const std::vector<float> pixels =
-      frame_.renderer().resolve(values.rows<const float>(), values.shape.back());
-  std::ranges::copy(pixels, images.rows<float>().begin());
+  Renderer::Impl& m = impl_of(frame_.renderer());
+  m.require_values(values.rows<const float>(), values.shape.back());
+  m.resolve(values.rows<const float>(), values.shape.back(), images.rows<float>());
 }
 
 void Batch::resolve_backward(const NamedArray& values, const NamedArray& grad_images,
@@ -145,10 +166,12 @@ void Batch::resolve_backward(const NamedArray& values, const NamedArray& grad_im
     throw InvalidArgument("sigma (batch)", "its gradient",
                           "that of vertices, views or intrinsics, with own shading");
   renderer.set_gradients(request_of(wanted_, true));
-  ResolveGradient found = renderer.resolve_backward(values.rows<const float>(), values.shape.back(),
-                                                    grad_images.rows<const float>());
-  std::ranges::copy(found.samples, grad_values.rows<float>().begin());
-  add_gradients(found.scene, true, gradients);
+  const auto samples = values.rows<const float>(), grads = grad_images.rows<const float>();
+  impl_of(renderer).require_values(samples, values.shape.back());
+  checks::require_numbers(grads, grads.size(), "grad_pixels (resolve)");
+  SceneGradient found =
+      impl_of(renderer).resolve_backward(samples, values.shape.back(), grads, grad_values.rows<float>());
+  add_gradients(found, true, gradients);
 }
 
 void Batch::resolve_tangent(std::size_t directions, NamedArrays tangents, const NamedArray& values,

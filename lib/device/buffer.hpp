@@ -173,6 +173,32 @@ class Buffer {
   Length length_ = 0;
 };
 
+/// All elements of a buffer in the host's memory; see Mapping.
+template <class T>
+class MappedRead {
+ public:
+  explicit MappedRead(const Buffer<T>& buffer)
+      : size_(buffer.size()),
+        mapping_(*buffer.device(), buffer.cl_buffer(), size_ * sizeof(T), CL_MAP_READ) {}
+
+  const T& operator[](std::size_t i) const { return static_cast<const T*>(mapping_.data())[i]; }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::size_t size_;
+  Mapping mapping_;
+};
+
+/// Writes all elements of a buffer: `write(std::span<T>)` is called once.
+template <class T, class Write>
+void overwrite(const Buffer<T>& buffer, const Write& write) {
+  if (buffer.size() == 0) return;
+  Mapping mapping(*buffer.device(), buffer.cl_buffer(), buffer.size() * sizeof(T),
+                  CL_MAP_WRITE_INVALIDATE_REGION);
+  write(std::span(static_cast<T*>(mapping.data()), buffer.size()));
+  mapping.give_back();
+}
+
 /// A buffer as the argument of a kernel: one of ours, or a caller's that holds as many elements. Valid as
 /// long as that.
 template <class T>

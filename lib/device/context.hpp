@@ -120,6 +120,26 @@ class LentWrite {
   cl::Event run_;
 };
 
+/// Bytes from the start of a buffer in the host's memory, after everything enqueued before: where memory is shared they
+/// are not copied.
+class Mapping {
+ public:
+  /// `access`: CL_MAP_READ, or CL_MAP_WRITE_INVALIDATE_REGION, by which all of them are written anew.
+  Mapping(Device::Impl& device, const cl::Buffer& buffer, std::size_t bytes, cl_map_flags access);
+  ~Mapping();
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+
+  void* data() const { return data_; }  ///< null where there are none
+  /// Ends it. What was written is there for what is enqueued from now on.
+  void give_back();
+
+ private:
+  Device::Impl& device_;
+  const cl::Buffer& buffer_;
+  void* data_ = nullptr;
+};
+
 /// Reads that the host waits for together. Not thread-safe.
 class PendingReads {
  public:

@@ -1,4 +1,6 @@
 // Transfers between host and device, counted; writes do not make the host wait while few bytes are pending.
+#include <utility>
+
 #include "device/context.hpp"
 
 namespace dpr {
@@ -50,6 +52,26 @@ LentWrite::LentWrite(Device::Impl& device, const cl::Buffer& buffer, std::span<c
 
 LentWrite::~LentWrite() {
   if (run_.wait() != CL_SUCCESS) device_.queue.finish();
+}
+
+Mapping::Mapping(Device::Impl& device, const cl::Buffer& buffer, std::size_t bytes, cl_map_flags access)
+    : device_(device), buffer_(buffer) {
+  if (bytes == 0) return;
+  int error = CL_SUCCESS;
+  ++device.host_waits;
+  data_ = device.queue.enqueueMapBuffer(buffer, CL_TRUE, access, 0, bytes, nullptr, nullptr, &error);
+  check_cl(error, "clEnqueueMapBuffer");
+  (access == CL_MAP_READ ? device.bytes_from_device : device.bytes_to_device) += bytes;
+}
+
+Mapping::~Mapping() {
+  if (data_ != nullptr) device_.queue.enqueueUnmapMemObject(buffer_, data_);
+}
+
+void Mapping::give_back() {
+  if (data_ == nullptr) return;
+  check_cl(device_.queue.enqueueUnmapMemObject(buffer_, std::exchange(data_, nullptr)),
+           "clEnqueueUnmapMemObject");
 }
 
 PendingReads::~PendingReads() {

@@ -139,6 +139,49 @@ std::vector<float> interpolate_steps(const Samples& samples, const Attributes& a
   return found;
 }
 
+namespace {
+
+/// Parts of the samples, each of which adds to rows of its own: by the numbers alone, so that the sums are.
+std::size_t parts_of(const Table& table, std::size_t numbers) {
+  constexpr std::size_t k_most = 8;
+  const std::size_t of_rows = table.count() * table.channels() / std::max<std::size_t>(numbers, 1);
+  return std::clamp<std::size_t>(std::min(table.count() / k_least_of_thread, of_rows), 1, k_most);
+}
+
+/// Adds what samples from `first` up to `last` say to `values`, and writes the gradients of their barycentrics.
+void add_samples(const Table& table, const Samples& samples, const Attributes& attributes,
+                 std::span<const float> grad_values, std::span<const float> grad_steps, std::size_t first,
+                 std::size_t last, float* values, std::span<vec2> barycentrics) {
+  const std::size_t channels = table.channels();
+  for (std::size_t i = first; i < last; ++i) {
+    if (table.is_empty(i)) continue;
+    const auto corners = table.corners(i);
+    const auto weights = weights_of(samples.barycentrics[i]);
+    const float *const grad = &grad_values[i * channels], *const of = attributes.values.data();
+    float *const corner0 = values + corners[0], *const corner1 = values + corners[1],
+                 *const corner2 = values + corners[2];
+    vec2 by_place(0);
+    for (std::size_t c = 0; c < channels; ++c) {
+      corner0[c] += grad[c] * weights[0];
+      corner1[c] += grad[c] * weights[1];
+      corner2[c] += grad[c] * weights[2];
+      const float at_first = of[corners[0] + c];
+      by_place += grad[c] * vec2(of[corners[1] + c] - at_first, of[corners[2] + c] - at_first);
+    }
+    barycentrics[i] = by_place;
+    if (grad_steps.empty()) continue;
+    const vec4& step = samples.steps[i];
+    const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const float* const of_step = &grad_steps[2 * (i * channels + c)];
+      for (std::size_t k = 0; k < 3; ++k)
+        values[corners[k] + c] += of_step[0] * right[k] + of_step[1] * down[k];
+    }
+  }
+}
+
+}  // namespace
+
 InterpolateGradient interpolate_backward(const Samples& samples, const Attributes& attributes,
                                          std::span<const float> grad_values,
                                          std::span<const float> grad_steps) {
@@ -148,42 +191,20 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
     table.require_steps();
     checks::require_numbers(grad_steps, 2 * grad_values.size(), "grad_steps (interpolate)");
   }
-  const std::size_t channels = table.channels();
-  InterpolateGradient found{std::vector<float>(attributes.values.size()), std::vector<vec2>(table.count())};
-  // Samples share rows: one thread gathers these, in order.
-  const auto gather = [&] {
-    for (std::size_t i = 0; i < table.count(); ++i) {
-      if (table.is_empty(i)) continue;
-      const auto corners = table.corners(i);
-      const auto add = [&](std::size_t channel, float grad, const std::array<float, 3>& weights) {
-        for (std::size_t k = 0; k < 3; ++k) found.values[corners[k] + channel] += grad * weights[k];
-      };
-      const auto weights = weights_of(samples.barycentrics[i]);
-      for (std::size_t c = 0; c < channels; ++c) add(c, grad_values[i * channels + c], weights);
-      if (grad_steps.empty()) continue;
-      const vec4& step = samples.steps[i];
-      for (std::size_t c = 0; c < channels; ++c) {
-        const float* const of_step = &grad_steps[2 * (i * channels + c)];
-        add(c, of_step[0], changes_of(step.x, step.z));
-        add(c, of_step[1], changes_of(step.y, step.w));
-      }
-    }
+  const std::size_t numbers = attributes.values.size(), parts = parts_of(table, numbers);
+  InterpolateGradient found{std::vector<float>(numbers), std::vector<vec2>(table.count())};
+  std::vector<float> others((parts - 1) * numbers);
+  const auto add = [&](std::size_t first_part, std::size_t last_part) {
+    for (std::size_t part = first_part; part < last_part; ++part)
+      add_samples(table, samples, attributes, grad_values, grad_steps, table.count() * part / parts,
+                  table.count() * (part + 1) / parts,
+                  part == 0 ? found.values.data() : &others[(part - 1) * numbers], found.barycentrics);
   };
-  std::future<void> gathered = aside(table.count(), gather);
-  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      if (table.is_empty(i)) continue;
-      const auto corners = table.corners(i);
-      vec2 by_place(0);
-      for (std::size_t c = 0; c < channels; ++c) {
-        by_place +=
-            grad_values[i * channels + c] * vec2(mixed(attributes.values, corners, c, changes_of(1, 0)),
-                                                 mixed(attributes.values, corners, c, changes_of(0, 1)));
-      }
-      found.barycentrics[i] = by_place;
-    }
+  in_parallel(parts, add, 1);
+  in_parallel(numbers, [&](std::size_t first, std::size_t last) {
+    for (std::size_t part = 0; part + 1 < parts; ++part)
+      for (std::size_t i = first; i < last; ++i) found.values[i] += others[part * numbers + i];
   });
-  gathered.get();
   return found;
 }
 

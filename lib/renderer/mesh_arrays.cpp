@@ -336,7 +336,8 @@ void Renderer::Impl::replace(const ArrayRef& at, std::vector<Element>& held,
       const std::span<const float> numbers = checks::floats_of(elements);
       packed_.resize(impl_of(device), numbers.size());
       write.emplace(impl_of(device), packed_.cl_buffer(), std::as_bytes(numbers));
-      made_exchange().unpack(packed_, sizeof(Element) / sizeof(float), elements.size(), spare, first);
+      made_exchange().give(vectors_of(packed_, 0, sizeof(Element) / sizeof(float)), elements.size(),
+                           vectors_of(spare, first, 4));
     }
     copy_checked(row.name, elements, copy, has_box ? &box : nullptr);
   } else {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/checks.hpp"
+#include "base/parallel.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "renderer/setter_checks.hpp"
 #include "scene/gradient_table.hpp"
@@ -67,6 +68,11 @@ void Renderer::Impl::require_image() {
   render_again();
 }
 
+void Renderer::Impl::require_values(std::span<const float> samples, std::size_t channels) const {
+  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
+  checks::require_numbers(samples, channels * views.size() * frame.width * frame.height, "samples (resolve)");
+}
+
 void Renderer::Impl::find_samples() {
   if (!surface_samples) surface_samples.emplace(impl_of(device));
   for_each_band(*this, [&] { surface_samples->forward(frame, bin, rasterize, layers); });
@@ -89,9 +95,10 @@ SceneGradient Renderer::Impl::finish_geometric_gradient() {
   return read_gradient();
 }
 
-SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_places) {
+SceneGradient Renderer::Impl::samples_backward(const WritePlaces& write) {
   const GeometricRequest request(scene.gradients);
-  own_group_.upload(impl_of(device), grad_places);
+  own_group_.resize(impl_of(device), layers * views.size() * frame.width * frame.height);
+  overwrite(own_group_, write);
   if (!surface_samples) surface_samples.emplace(impl_of(device));
   for_each_band(*this, [&] {
     surface_samples->backward(frame, own_group_, layers, rasterize);
@@ -111,7 +118,8 @@ SceneGradient Renderer::Impl::samples_backward(std::span<const cl_float4> grad_p
 void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels) {
   see_layers(layers);
   Device::Impl& on = impl_of(device);
-  own_samples_.upload(on, samples);
+  own_samples_.resize(on, samples.size());
+  const LentWrite write(on, own_samples_.cl_buffer(), std::as_bytes(samples));
   own_pixels_.resize(on, pixels.size());
   const std::size_t sample_count = samples.size() / channels, pixel_count = pixels.size() / channels;
   own_group_.resize(on, sample_count);
@@ -124,18 +132,21 @@ void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channel
   own_pixels_.download(pixels);
 }
 
-ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples, std::size_t channels,
-                                                 std::span<const float> grad_pixels) {
+SceneGradient Renderer::Impl::resolve_backward(std::span<const float> samples, std::size_t channels,
+                                               std::span<const float> grad_pixels,
+                                               std::span<float> grad_samples) {
   see_layers(layers);
   const GeometricRequest request(scene.gradients);
   Device::Impl& on = impl_of(device);
   const std::size_t sample_count = samples.size() / channels, pixel_count = grad_pixels.size() / channels;
   const std::size_t vertices = views.size() * frame.vertices;
-  own_samples_.upload(on, samples);
-  own_pixels_.upload(on, grad_pixels);
+  own_samples_.resize(on, samples.size());
+  own_pixels_.resize(on, grad_pixels.size());
+  const LentWrite values(on, own_samples_.cl_buffer(), std::as_bytes(samples)),
+      grads(on, own_pixels_.cl_buffer(), std::as_bytes(grad_pixels));
   own_group_.resize(on, sample_count);
   own_image_.resize(on, pixel_count);
-  ResolveGradient total{std::vector<float>(samples.size()), {}};
+  SceneGradient total;
   for (std::size_t first = 0; first < channels; first += 4) {
     const FloatVectors group = group_of(own_samples_, first, channels);
     made_exchange().give(group, sample_count, vectors_of(own_group_, 0, 4));
@@ -156,12 +167,12 @@ ResolveGradient Renderer::Impl::resolve_backward(std::span<const float> samples,
     pixel_noise->contour.gather(contour_inputs(), pixel_noise->antialias.grad_ends, grad_vertices, clip.grad);
     SceneGradient of_group = finish_geometric_gradient();
     if (first == 0) {
-      total.scene = std::move(of_group);
+      total = std::move(of_group);
     } else {
-      add(total.scene, of_group);
+      add(total, of_group);
     }
   }
-  own_samples_.download(total.samples);
+  own_samples_.download(grad_samples);
   return total;
 }
 
@@ -231,14 +242,20 @@ Samples Renderer::samples(bool with_steps) {
                 {},
                 {},
                 {}};
-  found.faces.reserve(m.surface_samples->faces.size());
-  for (const cl_uint face : m.surface_samples->faces.download())
-    found.faces.push_back(face == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(face));
-  found.barycentrics.reserve(found.faces.size());
-  found.depths.reserve(found.faces.size());
-  for (const cl_float4& place : m.surface_samples->places.download()) {
-    found.barycentrics.emplace_back(place.s[0], place.s[1]);
-    found.depths.push_back(place.s[2]);
+  {
+    const MappedRead faces(m.surface_samples->faces);
+    const MappedRead places(m.surface_samples->places);
+    found.faces.resize(faces.size());
+    found.barycentrics.resize(faces.size());
+    found.depths.resize(faces.size());
+    in_parallel(faces.size(), [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        const cl_float4& place = places[i];
+        found.faces[i] = faces[i] == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(faces[i]);
+        found.barycentrics[i] = {place.s[0], place.s[1]};
+        found.depths[i] = place.s[2];
+      }
+    });
   }
   if (with_steps) {
     m.surface_samples->find_steps(m.frame, m.setup.triangles, m.clip.faces);
@@ -256,18 +273,16 @@ SceneGradient Renderer::samples_backward(std::span<const glm::vec2> grad_barycen
   const std::size_t count = m.layers * m.views.size() * m.frame.width * m.frame.height;
   checks::require_numbers(checks::floats_of(grad_barycentrics), 2 * count, "grad_barycentrics");
   checks::require_numbers(grad_depths, count, "grad_depths");
-  std::vector<cl_float4> places(count);
-  for (std::size_t i = 0; i < count; ++i)
-    places[i] = {{grad_barycentrics[i].x, grad_barycentrics[i].y, grad_depths[i], 0}};
-  return m.samples_backward(places);
+  return m.samples_backward([&](std::span<cl_float4> places) {
+    for (std::size_t i = 0; i < count; ++i)
+      places[i] = {{grad_barycentrics[i].x, grad_barycentrics[i].y, grad_depths[i], 0}};
+  });
 }
 
 std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t channels) {
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve");
-  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
-                          "samples (resolve)");
+  m.require_values(samples, channels);
   std::vector<float> pixels(channels * m.pixel_count());
   m.resolve(samples, channels, pixels);
   return pixels;
@@ -277,11 +292,11 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
                                            std::span<const float> grad_pixels) {
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_backward");
-  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
-                          "samples (resolve)");
+  m.require_values(samples, channels);
   checks::require_numbers(grad_pixels, channels * m.pixel_count(), "grad_pixels (resolve)");
-  return m.resolve_backward(samples, channels, grad_pixels);
+  ResolveGradient found{std::vector<float>(samples.size()), {}};
+  found.scene = m.resolve_backward(samples, channels, grad_pixels, found.samples);
+  return found;
 }
 
 SamplesTangent Renderer::samples_tangent(std::span<const SceneTangent> directions) {
@@ -296,9 +311,7 @@ std::vector<float> Renderer::resolve_tangent(std::span<const float> samples, std
                                              std::span<const SceneTangent> directions) {
   Impl& m = *impl_;
   m.require_samples("Renderer::resolve_tangent");
-  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
-  checks::require_numbers(samples, channels * m.views.size() * m.frame.width * m.frame.height,
-                          "samples (resolve)");
+  m.require_values(samples, channels);
   checks::require_numbers(sample_tangents, directions.size() * samples.size(), "sample_tangents (resolve)");
   m.require_tangents(directions);
   if (directions.empty()) return {};

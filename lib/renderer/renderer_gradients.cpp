@@ -57,7 +57,7 @@ class RowReads {
     constexpr std::size_t k_components = sizeof(Vector) / sizeof(float);
     out.resize(count);
     packed_.resize(impl_of(renderer_.device), k_components * count);
-    renderer_.made_exchange().pack(buffer, first, k_components, count, packed_);
+    renderer_.made_exchange().give(vectors_of(buffer, first, 4), count, vectors_of(packed_, 0, k_components));
     packed_.download({reinterpret_cast<float*>(out.data()), k_components * count}, 0, reads_);
   }
 

@@ -139,10 +139,13 @@ struct Renderer::Impl : OnDevice, ViewSet {
   /// Throws InvalidArgument unless the last frame has samples for shading of the caller's own.
   void require_samples(const char* caller);
   void find_samples();
-  SceneGradient samples_backward(std::span<const cl_float4> grad_places);
+  /// Writes the gradients of all samples' places, as float4[layer][pixel]: see samples_backward of the kernels.
+  using WritePlaces = std::function<void(std::span<cl_float4>)>;
+  SceneGradient samples_backward(const WritePlaces& write);
+  void require_values(std::span<const float> samples, std::size_t channels) const;
   void resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels);
-  ResolveGradient resolve_backward(std::span<const float> samples, std::size_t channels,
-                                   std::span<const float> grad_pixels);
+  SceneGradient resolve_backward(std::span<const float> samples, std::size_t channels,
+                                 std::span<const float> grad_pixels, std::span<float> grad_samples);
   SamplesTangent samples_tangent(std::span<const SceneTangent> directions);
   void resolve_tangent(std::span<const float> samples, std::size_t channels,
                        std::span<const float> sample_tangents, std::span<const SceneTangent> directions,

@@ -7,6 +7,12 @@ cl_uint4 layout(const FloatVectors& v) {
   return {{to_uint(v.first), to_uint(v.stride), to_uint(v.rows), to_uint(v.components)}};
 }
 
+bool are_packed(const FloatVectors& v) { return v.rows == 1 && v.components >= 1 && v.components <= 4; }
+/// Elements of a buffer of vectors.
+bool are_rows(const FloatVectors& v) {
+  return v.rows == 1 && v.components == 4 && v.stride == 4 && v.first % 4 == 0;
+}
+
 }  // namespace
 
 FloatVectors vectors_of(const Buffer<cl_float4>& buffer, std::size_t first, std::size_t components) {
@@ -25,20 +31,6 @@ void Exchange::take(const FloatVectors& from, std::size_t count, Buffer<float>& 
   copy(from, count, vectors_of(to, 0, components), true);
 }
 
-void Exchange::unpack(const Buffer<float>& packed, std::size_t components, std::size_t count,
-                      Buffer<cl_float4>& to, std::size_t first) {
-  if (components != 3) return take(vectors_of(packed, 0, components), count, to, first);
-  launch_(count, kernel::exchange_unpack{
-                     .count = to_uint(count), .first = to_uint(first), .packed = packed, .rows = to});
-}
-
-void Exchange::pack(const Buffer<cl_float4>& from, std::size_t first, std::size_t components,
-                    std::size_t count, Buffer<float>& packed) {
-  if (components != 3) return give(vectors_of(from, first, 4), count, vectors_of(packed, 0, components));
-  launch_(count, kernel::exchange_pack{
-                     .count = to_uint(count), .first = to_uint(first), .rows = from, .packed = packed});
-}
-
 void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                             Buffer<shared::ViewParams>& cameras) {
   launch_(count, kernel::exchange_cameras{.count = to_uint(count),
@@ -49,7 +41,21 @@ void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool or
 }
 
 void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
-  copy(from, count, to, false);
+  if (are_packed(from) && are_rows(to)) {
+    launch_(count, kernel::exchange_unpack{.count = to_uint(count),
+                                           .first = to_uint(to.first / 4),
+                                           .layout = layout(from),
+                                           .packed = BufferRef<cl_uint>(from.buffer),
+                                           .rows = BufferRef<cl_uint4>(to.buffer)});
+  } else if (are_rows(from) && are_packed(to)) {
+    launch_(count, kernel::exchange_pack{.count = to_uint(count),
+                                         .first = to_uint(from.first / 4),
+                                         .layout = layout(to),
+                                         .rows = BufferRef<cl_uint4>(from.buffer),
+                                         .packed = BufferRef<cl_uint>(to.buffer)});
+  } else {
+    copy(from, count, to, false);
+  }
 }
 
 void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {

@@ -32,11 +32,6 @@ class Exchange {
   void take(const FloatVectors& from, std::size_t count, Buffer<cl_float4>& to, std::size_t first);
   /// The same to packed vectors of so many floats, from the first element on.
   void take(const FloatVectors& from, std::size_t count, Buffer<float>& to, std::size_t components);
-  /// From `count` packed vectors of two or three finite floats to elements of `to` from `first` on, and back.
-  void unpack(const Buffer<float>& packed, std::size_t components, std::size_t count, Buffer<cl_float4>& to,
-              std::size_t first);
-  void pack(const Buffer<cl_float4>& from, std::size_t first, std::size_t components, std::size_t count,
-            Buffer<float>& packed);
   /// From `count` world-to-camera matrices, of three rows each, to what cameras have of them.
   void take_cameras(const FloatVectors& from, std::size_t count, bool orthographic,
                     Buffer<shared::ViewParams>& cameras);

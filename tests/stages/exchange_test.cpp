@@ -47,26 +47,30 @@ TEST_SUITE("unit") {
     CHECK(found[k_first + k_count].s[0] == -9.0F);
   }
 
-  TEST_CASE("exchange: packed vectors become rows and come back") {
+  TEST_CASE("exchange: some numbers of vectors become rows and come back") {
     const Device device = open_device();
     Exchange exchange(impl_of(device));
-    constexpr std::size_t k_count = 7, k_first = 2;
-    for (const std::size_t components : {2U, 3U}) {
+    constexpr std::size_t k_count = 7, k_first = 2, k_stride = 5;
+    for (std::size_t components = 1; components <= 4; ++components) {
       CAPTURE(components);
-      const std::vector<float> floats = random_floats(components * k_count, 4);
+      const std::vector<float> floats = random_floats(k_stride * k_count, 4);
       const Buffer<float> packed(impl_of(device), floats);
       Buffer<cl_float4> rows(impl_of(device),
                              std::vector<cl_float4>(k_first + k_count, cl_float4{{-9, -9, -9, -9}}));
-      exchange.unpack(packed, components, k_count, rows, k_first);
+      exchange.give({packed.cl_buffer()(), 1, k_stride, components}, k_count, vectors_of(rows, k_first, 4));
       const std::vector<cl_float4> found = rows.download();
       CHECK(found[k_first - 1].s[0] == -9.0F);
       for (std::size_t i = 0; i < k_count; ++i) {
         for (std::size_t k = 0; k < 4; ++k)
-          CHECK(found[k_first + i].s[k] == (k < components ? floats[components * i + k] : 0.0F));
+          CHECK(found[k_first + i].s[k] == (k < components ? floats[k_stride * i + 1 + k] : 0.0F));
       }
-      Buffer<float> again(impl_of(device), floats.size());
-      exchange.pack(rows, k_first, components, k_count, again);
-      CHECK(again.download() == floats);
+      Buffer<float> again(impl_of(device), std::vector<float>(floats.size(), -7));
+      exchange.give(vectors_of(rows, k_first, 4), k_count, {again.cl_buffer()(), 1, k_stride, components});
+      const std::vector<float> back = again.download();
+      for (std::size_t i = 0; i < floats.size(); ++i) {
+        const std::size_t place = i % k_stride;
+        CHECK(back[i] == (place >= 1 && place <= components ? floats[i] : -7.0F));
+      }
     }
   }
 
