@@ -59,6 +59,14 @@ class Table {
     return {(first + face.x) * channels(), (first + face.y) * channels(), (first + face.z) * channels()};
   }
 
+  /// Behind the samples after it that show the same face of the same view.
+  std::size_t end_of_run(std::size_t sample) const {
+    const std::size_t end = (sample / of_view_ + 1) * of_view_;
+    std::size_t last = sample + 1;
+    while (last < end && samples_.faces[last] == samples_.faces[sample]) ++last;
+    return last;
+  }
+
   void require_steps() const {
     if (samples_.steps.size() != count())
       throw InvalidArgument("samples (interpolate)", "no steps", "those of Renderer::samples(true)");
@@ -148,37 +156,62 @@ std::size_t parts_of(const Table& table, std::size_t numbers) {
   return std::clamp<std::size_t>(std::min(table.count() / k_least_of_thread, of_rows), 1, k_most);
 }
 
-/// Adds what samples from `first` up to `last` say to `values`, and writes the gradients of their barycentrics.
-void add_samples(const Table& table, const Samples& samples, const Attributes& attributes,
-                 std::span<const float> grad_values, std::span<const float> grad_steps, std::size_t first,
-                 std::size_t last, float* values, std::span<vec2> barycentrics) {
-  const std::size_t channels = table.channels();
-  for (std::size_t i = first; i < last; ++i) {
-    if (table.is_empty(i)) continue;
-    const auto corners = table.corners(i);
-    const auto weights = weights_of(samples.barycentrics[i]);
-    const float *const grad = &grad_values[i * channels], *const of = attributes.values.data();
-    float *const corner0 = values + corners[0], *const corner1 = values + corners[1],
-                 *const corner2 = values + corners[2];
-    vec2 by_place(0);
-    for (std::size_t c = 0; c < channels; ++c) {
-      corner0[c] += grad[c] * weights[0];
-      corner1[c] += grad[c] * weights[1];
-      corner2[c] += grad[c] * weights[2];
-      const float at_first = of[corners[0] + c];
-      by_place += grad[c] * vec2(of[corners[1] + c] - at_first, of[corners[2] + c] - at_first);
-    }
-    barycentrics[i] = by_place;
-    if (grad_steps.empty()) continue;
-    const vec4& step = samples.steps[i];
-    const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
-    for (std::size_t c = 0; c < channels; ++c) {
-      const float* const of_step = &grad_steps[2 * (i * channels + c)];
+/// Samples of one face beside each other: what they add to its corners, a few channels at a time.
+class Run {
+ public:
+  Run(const Table& table, const Samples& samples, const Attributes& attributes)
+      : table_(table), samples_(samples), attributes_(attributes) {}
+
+  /// To the rows of `values` and the gradients of the barycentrics, of samples from `first` up to `last`.
+  void add(std::span<const float> grad_values, std::size_t first, std::size_t last, float* values,
+           std::span<vec2> barycentrics) const {
+    const std::size_t channels = table_.channels();
+    const auto corners = table_.corners(first);
+    for (std::size_t from = 0; from < channels; from += k_together) {
+      const std::size_t count = std::min(channels - from, k_together);
+      const float* const of = &attributes_.values[from];
+      float by_first[k_together], by_second[k_together], sums[3][k_together] = {};
+      for (std::size_t c = 0; c < count; ++c) {
+        by_first[c] = of[corners[1] + c] - of[corners[0] + c];
+        by_second[c] = of[corners[2] + c] - of[corners[0] + c];
+      }
+      for (std::size_t i = first; i < last; ++i) {
+        const auto weights = weights_of(samples_.barycentrics[i]);
+        const float* const grad = &grad_values[i * channels + from];
+        vec2 by_place(0);
+        for (std::size_t c = 0; c < count; ++c) {
+          for (std::size_t k = 0; k < 3; ++k) sums[k][c] += grad[c] * weights[k];
+          by_place += grad[c] * vec2(by_first[c], by_second[c]);
+        }
+        barycentrics[i] += by_place;
+      }
       for (std::size_t k = 0; k < 3; ++k)
-        values[corners[k] + c] += of_step[0] * right[k] + of_step[1] * down[k];
+        for (std::size_t c = 0; c < count; ++c) values[corners[k] + from + c] += sums[k][c];
     }
   }
-}
+
+  void add_steps(std::span<const float> grad_steps, std::size_t first, std::size_t last,
+                 float* values) const {
+    const std::size_t channels = table_.channels();
+    const auto corners = table_.corners(first);
+    for (std::size_t i = first; i < last; ++i) {
+      const vec4& step = samples_.steps[i];
+      const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+      for (std::size_t c = 0; c < channels; ++c) {
+        const float* const of_step = &grad_steps[2 * (i * channels + c)];
+        for (std::size_t k = 0; k < 3; ++k)
+          values[corners[k] + c] += of_step[0] * right[k] + of_step[1] * down[k];
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t k_together = 16;
+
+  const Table& table_;
+  const Samples& samples_;
+  const Attributes& attributes_;
+};
 
 }  // namespace
 
@@ -194,11 +227,19 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
   const std::size_t numbers = attributes.values.size(), parts = parts_of(table, numbers);
   InterpolateGradient found{std::vector<float>(numbers), std::vector<vec2>(table.count())};
   std::vector<float> others((parts - 1) * numbers);
+  const Run run(table, samples, attributes);
+  const auto add_part = [&](std::size_t part) {
+    float* const values = part == 0 ? found.values.data() : &others[(part - 1) * numbers];
+    const std::size_t end = table.count() * (part + 1) / parts;
+    for (std::size_t i = table.count() * part / parts, last; i < end; i = last) {
+      last = std::min(table.end_of_run(i), end);
+      if (table.is_empty(i)) continue;
+      run.add(grad_values, i, last, values, found.barycentrics);
+      if (!grad_steps.empty()) run.add_steps(grad_steps, i, last, values);
+    }
+  };
   const auto add = [&](std::size_t first_part, std::size_t last_part) {
-    for (std::size_t part = first_part; part < last_part; ++part)
-      add_samples(table, samples, attributes, grad_values, grad_steps, table.count() * part / parts,
-                  table.count() * (part + 1) / parts,
-                  part == 0 ? found.values.data() : &others[(part - 1) * numbers], found.barycentrics);
+    for (std::size_t part = first_part; part < last_part; ++part) add_part(part);
   };
   in_parallel(parts, add, 1);
   in_parallel(numbers, [&](std::size_t first, std::size_t last) {

@@ -67,6 +67,15 @@ class JaxTest(unittest.TestCase):
                     continue
                 np.testing.assert_allclose(gradient / scale, wanted / scale, atol=1e-4, err_msg=name)
 
+        def black(covered, vertices, colors):
+            samples = renderer.rasterize(vertices, FACES, views, intrinsics)
+            return (samples.resolve(samples.interpolate(colors, covered=covered)) * weights[..., :3]).sum()
+
+        (value, gradients), wanted = (jax.value_and_grad(black, argnums=(1, 2))(covered, *given[:2]) for covered in (True, False))
+        self.assertAlmostEqual(float(value), float(wanted[0]), 4)
+        for gradient, of_all in zip(gradients, wanted[1]):
+            np.testing.assert_allclose(gradient, of_all, atol=1e-5 * float(np.abs(of_all).max()))
+
         def depths(vertices):
             samples = renderer.rasterize(vertices, FACES, views, intrinsics, layers=2)
             return sum((layer.depth * layer.mask).sum() for layer in samples.layers)

@@ -251,6 +251,72 @@ class OwnShadingTest(unittest.TestCase):
             with self.subTest(words), self.assertRaisesRegex(ValueError, words):
                 samples.interpolate(*given)
 
+    def test_covered_samples_alone(self):
+        """The same numbers as of all samples: shared tables, those of views, faces of views, lists, layers."""
+        square = np.concatenate([0.9 * SQUARE[:3], SQUARE[:1]])
+        shapes = np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])
+        padded = np.stack([FACES, np.concatenate([FACES[:1], -np.ones((3, 3), np.int64)])])
+        lists = [TETRAHEDRON, SQUARE], [FACES, SQUARE_FACES]
+        for name, (vertices, faces), given in (
+                ("shared", (TETRAHEDRON, FACES), (COLORS,)), ("of views", (shapes, FACES), (random(2, 4, 5, seed=2),)),
+                ("one row", (shapes, FACES), (COLORS[None],)),
+                ("own faces", (TETRAHEDRON, FACES), (random(7, 2, seed=1), FACES + 3)),
+                ("faces of views", (np.stack([TETRAHEDRON, square]), padded), (random(2, 4, 3, seed=8),)),
+                ("shared by views", (np.stack([TETRAHEDRON, square]), padded), (COLORS,)),
+                ("list", lists, ([random(4, 3, seed=1), random(5, 3, seed=2)],))):
+            with self.subTest(name):
+                whole = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics, layers=2)
+                for samples in whole.layers:
+                    self.assertTrue(samples.mask.any())
+                    values, rows = samples.interpolate(*given), samples.interpolate(*given, covered=True)
+                    np.testing.assert_array_equal(rows, values[samples.mask])
+                    np.testing.assert_array_equal(samples.resolve(rows), samples.resolve(values))
+                    image, pullback = samples.resolve_with_vjp(rows)
+                    expected, of_all = samples.resolve_with_vjp(values)
+                    np.testing.assert_array_equal(image, expected)
+                    weights = np.resize(WEIGHTS, image.shape)
+                    (found, scene), (grad_values, by_name) = pullback(weights), of_all(weights)
+                    np.testing.assert_array_equal(found, grad_values[samples.mask])
+                    np.testing.assert_array_equal(scene["views"], by_name["views"])
+                    moved = random(2, *rows.shape, seed=6)
+                    spread = np.zeros((2, *values.shape), np.float32)
+                    spread[:, samples.mask] = moved
+                    np.testing.assert_array_equal(*(samples.resolve_with_jvp(*given)[1]
+                                                    for given in ((rows, moved), (values, spread))))
+        with self.assertRaisesRegex(ValueError, rf"values .*got \[{len(rows) - 1}, 3\], expected \[{len(rows)}, C\]"):
+            samples.resolve(rows[1:])
+        with self.assertWarns(UserWarning):
+            nothing = RENDERER.rasterize(TETRAHEDRON + np.float32([99, 0, 0]), FACES, self.views, self.intrinsics)
+        rows = nothing.interpolate(COLORS, covered=True)
+        self.assertEqual(rows.shape, (0, 3))
+        self.assertTrue((nothing.resolve(rows) == 0).all())
+
+    @unittest.skipUnless(torch, "no PyTorch")
+    def test_covered_samples_of_tensors(self):
+        leaves = [torch.from_numpy(array.copy()).requires_grad_() for array in (TETRAHEDRON, random(2, 4, 3, seed=8))]
+        weights = torch.from_numpy(WEIGHTS[..., :3].copy())
+        gradients = []
+        for covered in (False, True):
+            samples = RENDERER.rasterize(leaves[0], torch.from_numpy(FACES), self.views, self.intrinsics)
+            values = samples.interpolate(leaves[1], covered=covered)
+            self.assertEqual(values.ndim, 2 if covered else 4)
+            image = samples.resolve(values * values)
+            gradients.append([image.detach(), *torch.autograd.grad((image * weights).sum(), leaves)])
+        for found, wanted in zip(*gradients):
+            self.check_close(found, wanted, 1e-6)
+        with self.assertWarns(UserWarning):
+            nothing = RENDERER.rasterize(leaves[0][:0], torch.zeros(0, 3, dtype=torch.int64), self.views, self.intrinsics)
+        rows = nothing.interpolate(torch.zeros(0, 3), covered=True)
+        self.assertEqual((tuple(rows.shape), float(nothing.resolve(rows).detach().abs().max())), ((0, 3), 0.0))
+        if hasattr(torch, "func"):
+            def shown(vertices):
+                samples = RENDERER.rasterize(vertices, torch.from_numpy(FACES), self.views, self.intrinsics)
+                return samples.resolve(samples.interpolate(leaves[1].detach(), covered=True))
+            moved = torch.from_numpy(random(4, 3, seed=9))
+            image, tangent = torch.func.jvp(shown, (leaves[0].detach(),), (moved,))
+            gradient, = torch.autograd.grad((shown(leaves[0]) * weights).sum(), leaves[0])
+            self.check_close((tangent * weights).sum(), (moved * gradient).sum(), 1e-4)
+
     def test_layers(self):
         samples = RENDERER.rasterize(*self.arguments(), layers=3)
         front, back, none = samples.layers

@@ -117,6 +117,26 @@ def repeated(array, count):
     return np.repeat(to_numpy(array), count, 0)
 
 
+def rows(array, places):
+    """array[places], of one axis; a differentiable function of tensors."""
+    kind = module_of(array)
+    if kind == "torch":
+        return array.index_select(0, like(array, places))
+    return array[places] if kind == "jax" else like(array, np.take(to_numpy(array), places, 0))
+
+
+def spread(array, places, count):
+    """The transpose of rows(): floats [count, ...], 0 elsewhere."""
+    shape, kind = (count, *array.shape[1:]), module_of(array)
+    if kind == "torch":
+        return array.new_zeros(shape).index_copy(0, like(array, places), array)
+    if kind == "jax":
+        return sys.modules["jax"].numpy.zeros(shape, np.float32).at[places].set(array)
+    found = np.zeros(shape, np.float32)
+    found[places] = to_numpy(array)
+    return like(array, found)
+
+
 def padded(arrays):
     """[V_i, ...] of one library as [N, most, ...], with zeros behind; a differentiable function of tensors."""
     kind = module_of(arrays[0])

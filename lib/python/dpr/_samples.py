@@ -1,6 +1,7 @@
 """Shading of the caller's own, with noise on the pixel around it."""
 from __future__ import annotations
 
+import functools
 import sys
 from typing import Any, Callable, Dict, Optional, Tuple
 
@@ -66,21 +67,48 @@ class Samples:
         """[N, h, w]: whether there is a face."""
         return self.face_id >= 0
 
-    def interpolate(self, attributes: Array, faces: Optional[Array] = None) -> Array:
+    def interpolate(self, attributes: Array, faces: Optional[Array] = None, covered: bool = False) -> Array:
         """Attributes of vertices, [V, C] or [N, V, C], at the samples: [N, h, w, C], 0 where nothing is. faces: [F, 3], or
         [N, F, 3] as those of rasterize(), indices of the attributes for the corners of the mesh's faces, where they have
-        some of their own. Of a list of meshes both are lists too. Raises ValueError for other shapes and indices."""
+        some of their own. Of a list of meshes both are lists too. covered: only of the M samples where there is a face,
+        [M, C] in the order of x[mask], so that a shader works on no others; resolve() takes its values so. Not within
+        jax.jit(), which knows no M. Raises ValueError for other shapes and indices."""
         attributes, faces = self._tables_of(attributes, faces)
-        if not self._is_of_jax and 0 not in (*faces.shape, *attributes.shape[-2:]):
+        if covered:
+            found = self._interpolated(*self._covered_alone(attributes, faces))
+            return found.reshape(found.shape[-2:])
+        return self._interpolated(self.face_id, self.barycentrics, attributes, faces)
+
+    def _interpolated(self, face_id, barycentrics, attributes, faces):
+        mixed = functools.partial(self._mixed, face_id)
+        if not self._is_of_jax and 0 not in (*face_id.shape, *faces.shape, *attributes.shape[-2:]):
             if self._tensors is not None:
                 from . import _interpolate
-                return _interpolate.interpolate(self.face_id, self.barycentrics, attributes, faces, self._mixed)
+                return _interpolate.interpolate(face_id, barycentrics, attributes, faces, mixed)
             if isinstance(attributes, np.ndarray):
-                return interpolated(self.face_id, self.barycentrics, attributes, faces)
-        return self._mixed(self.barycentrics, attributes, faces)
+                return interpolated(face_id, barycentrics, attributes, faces)
+        return mixed(barycentrics, attributes, faces)
 
-    def _mixed(self, barycentrics, attributes, faces):
-        return (barycentrics[..., None] * self._at_corners(attributes, faces)).sum(-2)
+    def _mixed(self, face_id, barycentrics, attributes, faces):
+        return (barycentrics[..., None] * self._at_corners(face_id, attributes, faces)).sum(-2)
+
+    @functools.cached_property
+    def _covered(self):
+        """Places of the samples with a face, among all views' samples."""
+        face_id = self.face_id if self._is_of_jax else self._rasterized.outputs[0][self._layer]
+        return np.flatnonzero(np.asarray(face_id) >= 0)
+
+    def _covered_alone(self, attributes, faces):
+        """face_id and barycentrics [1, 1, M, ...] of the samples with a face, and tables of all views' vertices and faces."""
+        count, h, w = self.face_id.shape
+        ids, barycentrics = (_arrays.rows(array.reshape(count * h * w, *array.shape[3:]), self._covered)[None, None]
+                             for array in (self.face_id, self.barycentrics))
+        if attributes.ndim == 3 or faces.ndim == 3:
+            ids = ids + _arrays.like(ids, self._covered // (h * w) * faces.shape[-2])
+            step = attributes.shape[1] if attributes.ndim == 3 and len(attributes) > 1 else 0
+            faces = faces.clip(0) + _arrays.like(faces, step * np.arange(count)[:, None, None])
+            attributes, faces = attributes.reshape(-1, attributes.shape[-1]), faces.reshape(-1, 3)
+        return ids, barycentrics, attributes, faces
 
     def interpolate_steps(self, attributes: Array, faces: Optional[Array] = None) -> Array:
         """How fast interpolate(attributes, faces) changes from sample to sample to the right and down, [N, h, w, C, 2]: of
@@ -88,7 +116,8 @@ class Samples:
         if self._is_of_jax:
             _arrays.fail(TypeError, "interpolate_steps()", "samples of JAX", "those of other arrays", "dpr.Samples")
         steps = _arrays.like(self.depth, self._rasterized.steps[self._layer])
-        return (steps[..., None, :] * self._at_corners(*self._tables_of(attributes, faces))[..., None]).sum(-3)
+        corners = self._at_corners(self.face_id, *self._tables_of(attributes, faces))
+        return (steps[..., None, :] * corners[..., None]).sum(-3)
 
     def _tables_of(self, attributes, faces):
         """What was given as attributes [V, C] or [N, V, C], and faces."""
@@ -104,12 +133,12 @@ class Samples:
             faces = sys.modules["torch"].as_tensor(faces).long()
         return attributes, self._faces if faces is None else faces
 
-    def _at_corners(self, attributes, faces):
+    def _at_corners(self, face_id, attributes, faces):
         """[N, h, w, 3, C], or what broadcasts to it: attributes of the corners of the samples' faces."""
         if 0 in (*faces.shape, attributes.shape[-2]):
             return attributes.sum(-2)[..., None, None, None, :]  # there is nothing
         meshes = np.arange(len(faces))[:, None, None]
-        corners = faces[meshes, self.face_id.clip(0)] if faces.ndim == 3 else faces[self.face_id.clip(0)]
+        corners = faces[meshes, face_id.clip(0)] if faces.ndim == 3 else faces[face_id.clip(0)]
         return attributes[corners] if attributes.ndim == 2 else \
             attributes[np.arange(len(attributes))[:, None, None, None], corners]
 
@@ -165,10 +194,11 @@ class Samples:
     def resolve(self, values: Array) -> Array:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
-        the background's. Contours count that fewer surfaces hide than there are layers: whichever layer's resolve() is
-        called. Beside contours samples are continued, so that images may leave the values' range by a little. Raises
-        ValueError for another shape, and what is not finite."""
-        values = self._of_my_kind("values", values)
+        the background's; of values [M, C] of the samples with a face, as interpolate(covered=True) has them, it is 0, and a
+        channel of ones becomes the image's alpha. Contours count that fewer surfaces hide than there are layers: whichever
+        layer's resolve() is called. Beside contours samples are continued, so that images may leave the values' range by a
+        little. Raises ValueError for another shape, and what is not finite."""
+        values = self._of_all(self._of_my_kind("values", values))
         if self._is_of_jax:
             from . import _jax
             return _jax.resolve(self._rasterized, values, self._tensors)
@@ -177,14 +207,27 @@ class Samples:
             return _torch.resolve(self._rasterized, values, self._tensors)
         return _arrays.like(values, self._rasterized.resolve(_arrays.to_numpy(values)))
 
+    def _of_all(self, values):
+        """Values of all samples, 0 where nothing is, of those of the samples with a face."""
+        if values.ndim != 2:
+            return values
+        if len(values) != len(self._covered):
+            expected = f"[{len(self._covered)}, C], of the samples with a face"
+            _arrays.fail(ValueError, "values", list(values.shape), expected, "dpr.Samples")
+        size = self.face_id.shape
+        return _arrays.spread(values, self._covered, int(np.prod(size))).reshape(*size, values.shape[-1])
+
     def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
         """(resolve(values), pullback). pullback(grad_images) returns the gradient of the values and, by way of the
         contours, those of vertices, views and intrinsics, by name; of tensors, of those that required a gradient."""
         self._require_numpy("resolve_with_vjp()")
-        kept = _kept(values)
+        given = _kept(values)
+        kept = self._of_all(given)
 
         def pullback(grad_images):
             grad_values, found = self._rasterized.resolve_gradients(kept, _arrays.to_numpy(grad_images))
+            if given.ndim == 2:
+                grad_values = _arrays.rows(grad_values.reshape(-1, given.shape[-1]), self._covered)
             return _arrays.like(values, grad_values), self._by_name(found)
 
         return _arrays.like(values, self._rasterized.resolve(kept)), pullback
@@ -217,9 +260,11 @@ class Samples:
         value_tangents [K, *values.shape], and by way of the contours, vertices, views and intrinsics by `tangents` as
         jvp() takes them; of both, those left out stay."""
         self._require_numpy("resolve_with_jvp()")
-        kept = _kept(values)
+        kept = self._of_all(_kept(values))
         if value_tangents is not None:
             value_tangents = _kept(value_tangents, "tangents of values")
+            if value_tangents.ndim == 3:
+                value_tangents = np.stack([self._of_all(moved) for moved in value_tangents])
         if value_tangents is None and tangents is None:
             _arrays.fail(ValueError, "tangents", "none", "those of the values, or of one array at least", "dpr.Samples")
         count, given = (len(value_tangents), {}) if tangents is None else self._moving(tangents)

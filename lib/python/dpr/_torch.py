@@ -230,7 +230,7 @@ class _Rasterize(_OfOneCall):
         if not _HAS_CONTEXT:
             _arrays.fail(ValueError, "tangents", "some, with PyTorch before 2.0, which has no outputs without tangents",
                          "none, or those of Samples.jvp()", "dpr.rasterize")
-        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        numbers = tuple(i for i in ctx.call.wanted if tangents[i] is not None)  # 2.15 fills those of others
         found = _SampleTangents.apply(ctx.call.rendered, numbers, *(tangents[i][None] for i in numbers), *ctx.saved_tensors)
         return (None, *(tangent[0] for tangent in found))
 
@@ -258,7 +258,7 @@ class _Resolve(_OfOneCall):
 
     @staticmethod
     def jvp(ctx, _, moved, *tangents):
-        numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
+        numbers = tuple(i for i in ctx.rasterized.leaves if tangents[i] is not None)
         values = ctx.saved_tensors[0]
         moved = torch.zeros_like(values) if moved is None else moved
         images = _ImageTangents.apply(ctx.rasterized, numbers, moved[None], *(tangents[i][None] for i in numbers),

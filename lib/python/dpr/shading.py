@@ -101,6 +101,12 @@ def texture_at(texture: Tensor, texcoords: Tensor) -> Tensor:
     return found.reshape(*texcoords.shape[:-1], texture.shape[-1])
 
 
+def _share(numbers):
+    """From 0 to 1; at both the gradient is as between them, where clamp() has none in some versions of PyTorch."""
+    numbers = torch.where(numbers < 0, torch.zeros_like(numbers), numbers)
+    return torch.where(numbers > 1, torch.ones_like(numbers), numbers)
+
+
 def _reflectances(base_color, metallic):
     """(diffuse, specular at normal incidence)"""
     return base_color * (1 - metallic), _DIELECTRIC + (base_color - _DIELECTRIC) * metallic
@@ -233,7 +239,7 @@ class Environment:
     def specular(self, directions: Tensor, roughness: Number) -> Tensor:
         """Mean radiance [..., 3] around reflected directions [..., 3], for a roughness [..., 1] or a number, 0 to 1."""
         levels = [self.image, *self._means[1:]]
-        place = torch.as_tensor(roughness, dtype=directions.dtype).clamp(0, 1) * (len(levels) - 1)
+        place = _share(torch.as_tensor(roughness, dtype=directions.dtype)) * (len(levels) - 1)
         lower = place.detach().floor().clamp(max=len(levels) - 2)
         above, total = place - lower, torch.zeros_like(directions)
         for k, level in enumerate(levels):
@@ -246,7 +252,7 @@ class Environment:
     def shade(self, normal: Tensor, to_eye: Tensor, base_color: Tensor, metallic: Number, roughness: Number) -> Tensor:
         """Light [..., 3] that the surface sends to the eye; arguments as metallic_roughness() has them."""
         cosine = _dot(normal, to_eye).clamp(0, 1)
-        rough = torch.as_tensor(roughness, dtype=normal.dtype).clamp(0, 1).expand_as(cosine)
+        rough = _share(torch.as_tensor(roughness, dtype=normal.dtype)).expand_as(cosine)
         table = _reflected_shares().to(normal.dtype)
         places = cosine.reshape(-1) * table.shape[2], rough.reshape(-1) * table.shape[1]
         shares = _bilinear(table.permute(1, 2, 0), *places, False).reshape(*cosine.shape[:-1], 2)
