@@ -51,15 +51,24 @@ DPR_API dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, size_t directions
                                              size_t tangent_count, const dpr_array* values,
                                              const dpr_array* value_tangents, const dpr_array* images);
 
+/* What nvdiffrast's rasterize() returns, of the last layer of a frame with one sample a
+ * pixel and the camera of a dpr_clip_space. Arrays: its positions [N, V, 4]; faces [F, 3], or [N, F, 3] of each; and DPR_INT64
+ * "firsts" [N], added to the faces' numbers, if there are some. Outputs: "rast" [N, H, W, 4], weights of the corners 0
+ * and 1, z/w, and the face's number plus 1, and "rast_db" [N, H, W, 4], how fast these weights change from pixel to pixel
+ * to the right and down, one after the other; all are 0 where nothing is, and beyond z/w of -1 and 1. */
+DPR_API dpr_status dpr_clip_space_rast(dpr_frame* frame, const dpr_array* arrays, size_t count,
+                                       const dpr_array* outputs, size_t output_count);
+
 /* Numbers of vertices at samples (dpr/interpolate.hpp). Of the arrays face_id [L N, h, w], barycentrics [L N, h, w, 3]
  * and barycentric_steps as dpr_frame_samples() fills them, attributes [V, C] or [N, V, C], and faces [F, 3] or
  * [N, F, 3], indices of the attributes for the corners of the frame's faces. Outputs: "values" [L N, h, w, C], 0 where
  * nothing is, and "steps" [L N, h, w, 2 C], which need barycentric_steps: how fast each channel changes from sample to
- * sample to the right and down. */
+ * sample to the right and down. In place of the frame's arrays there may be rast and rast_db of dpr_clip_space_rast(),
+ * whose gradients have these names. */
 DPR_API dpr_status dpr_interpolate(const dpr_array* arrays, size_t count, const dpr_array* outputs,
                                    size_t output_count);
-/* The gradients of sum <grads, outputs>, of "attributes" and "barycentrics", which are those of corners 1 and 2: corner
- * 0 has the rest, and gradient 0. barycentric_steps count as constant. */
+/* The gradients of sum <grads, outputs>, of "attributes", "barycentric_steps" and "barycentrics", which are those of
+ * corners 1 and 2: corner 0 has the rest, and gradient 0. */
 DPR_API dpr_status dpr_interpolate_backward(const dpr_array* arrays, size_t count, const dpr_array* grads,
                                             size_t grad_count, const dpr_array* gradients,
                                             size_t gradient_count);

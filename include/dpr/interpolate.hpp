@@ -30,8 +30,9 @@ DPR_API std::vector<float> interpolate_steps(const Samples& samples, const Attri
 struct InterpolateGradient {
   std::vector<float> values;       ///< as Attributes::values
   std::vector<vec2> barycentrics;  ///< for Renderer::samples_backward()
+  std::vector<vec4> steps;         ///< as Samples::steps, where there are grad_steps
 };
-/// grad_steps: [...][channel][2], of interpolate_steps(), or none. The samples' own steps count as constant.
+/// grad_steps: [...][channel][2], of interpolate_steps(), or none.
 DPR_API InterpolateGradient interpolate_backward(const Samples& samples, const Attributes& attributes,
                                                  std::span<const float> grad_values,
                                                  std::span<const float> grad_steps = {});

@@ -51,6 +51,7 @@ class Batch {
   dpr_raster raster();
   void read_samples(NamedArrays samples);
   void samples_backward(NamedArrays grads, NamedArrays gradients);
+  void clip_space_rast(NamedArrays arrays, NamedArrays outputs);
   void resolve(const NamedArray& values, const NamedArray& images);
   void resolve_backward(const NamedArray& values, const NamedArray& grad_images,
                         const NamedArray& grad_values, NamedArrays gradients);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <string>
 
 #include "base/checks.hpp"
@@ -14,17 +15,12 @@ namespace {
 /// Attributes that fit samples, by the first number of a corner's channels.
 class Table {
  public:
-  Table(const Samples& samples, const Attributes& attributes)
+  Table(const SampleArrays& samples, const Attributes& attributes)
       : samples_(samples),
         attributes_(attributes),
-        of_view_(static_cast<std::size_t>(samples.width) * static_cast<std::size_t>(samples.height)),
-        views_(samples.faces.size() /
-               std::max<std::size_t>(of_view_ * static_cast<std::size_t>(samples.layers), 1)) {
-    if (views_ == 0 || samples.barycentrics.size() != samples.faces.size())
-      throw InvalidArgument("samples (interpolate)",
-                            std::to_string(samples.faces.size()) + " faces, " +
-                                std::to_string(samples.barycentrics.size()) + " barycentrics",
-                            "what Renderer::samples() returns");
+        of_view_(samples.size().width * samples.size().height),
+        views_(samples.size().count / std::max<std::size_t>(of_view_ * samples.size().layers, 1)) {
+    if (views_ == 0) throw InvalidArgument("samples (interpolate)", "none", "some");
     if (attributes.channels == 0) throw InvalidArgument("channels (interpolate)", "0", "at least 1");
     faces_ = attributes.faces_are_of_views ? rows_of_views(attributes.faces.size(), 1, "faces") : 0;
     row_stride_ =
@@ -34,10 +30,7 @@ class Table {
     checks::require_numbers(attributes.values,
                             (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
                             "attributes (interpolate)");
-    for (const std::int32_t face : samples.faces)
-      if (face >= 0 && static_cast<std::size_t>(face) >= faces)
-        throw InvalidArgument("faces (interpolate)", std::to_string(faces),
-                              "more than " + std::to_string(face) + ", which a sample shows");
+    require_faces(faces);
     for (std::size_t i = 0; i < attributes.faces.size(); ++i) {
       const uvec3& face = attributes.faces[i];
       const std::uint32_t largest = std::max({face.x, face.y, face.z});
@@ -48,13 +41,13 @@ class Table {
   }
 
   std::size_t channels() const { return attributes_.channels; }
-  std::size_t count() const { return samples_.faces.size(); }
-  bool is_empty(std::size_t sample) const { return samples_.faces[sample] < 0; }
+  std::size_t count() const { return samples_.size().count; }
+  bool is_empty(std::size_t sample) const { return samples_.face(sample) < 0; }
 
   /// The first of the numbers of a sample's corners.
   std::array<std::size_t, 3> corners(std::size_t sample) const {
     const std::size_t view = sample / of_view_ % views_;
-    const uvec3& face = attributes_.faces[view * faces_ + static_cast<std::size_t>(samples_.faces[sample])];
+    const uvec3& face = attributes_.faces[view * faces_ + static_cast<std::size_t>(samples_.face(sample))];
     const std::size_t first = view * row_stride_;
     return {(first + face.x) * channels(), (first + face.y) * channels(), (first + face.z) * channels()};
   }
@@ -63,16 +56,30 @@ class Table {
   std::size_t end_of_run(std::size_t sample) const {
     const std::size_t end = (sample / of_view_ + 1) * of_view_;
     std::size_t last = sample + 1;
-    while (last < end && samples_.faces[last] == samples_.faces[sample]) ++last;
+    while (last < end && samples_.face(last) == samples_.face(sample)) ++last;
     return last;
   }
 
   void require_steps() const {
-    if (samples_.steps.size() != count())
+    if (!samples_.has_steps())
       throw InvalidArgument("samples (interpolate)", "no steps", "those of Renderer::samples(true)");
   }
 
  private:
+  void require_faces(std::size_t faces) const {
+    std::atomic<std::int64_t> wrong = -1;
+    in_parallel(count(), [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        const std::int64_t face = samples_.face(i);
+        if (face < -1 || face >= static_cast<std::int64_t>(faces)) wrong = static_cast<std::int64_t>(i);
+      }
+    });
+    if (wrong < 0) return;
+    const std::int64_t face = samples_.face(static_cast<std::size_t>(wrong.load()));
+    if (face < 0) throw InvalidArgument("face_id (interpolate)", std::to_string(face), "faces, or -1");
+    throw InvalidArgument("faces (interpolate)", std::to_string(faces),
+                          "more than " + std::to_string(face) + ", which a sample shows");
+  }
   /// Of each view by itself.
   std::size_t rows_of_views(std::size_t numbers, std::size_t of_row, const char* name) const {
     const std::size_t rows = numbers / (of_row * views_);
@@ -82,7 +89,7 @@ class Table {
     return rows;
   }
 
-  const Samples& samples_;
+  const SampleArrays& samples_;
   const Attributes& attributes_;
   std::size_t of_view_, views_;
   std::size_t faces_ = 0, row_stride_ = 0;  // of a view; 0: all share them
@@ -103,13 +110,27 @@ float mixed(std::span<const float> values, const std::array<std::size_t, 3>& cor
 
 }  // namespace
 
+SampleArrays::SampleArrays(const Samples& samples)
+    : size_{static_cast<std::size_t>(samples.width), static_cast<std::size_t>(samples.height),
+            static_cast<std::size_t>(samples.layers), samples.faces.size()},
+      faces_(samples.faces.data()),
+      places_(samples.barycentrics.data()),
+      steps_(samples.steps.empty() ? nullptr : samples.steps.data()) {
+  const auto is_wrong = [&](std::size_t count) { return count != size_.count; };
+  if (is_wrong(samples.barycentrics.size()) || (steps_ && is_wrong(samples.steps.size())))
+    throw InvalidArgument("samples (interpolate)",
+                          std::to_string(size_.count) + " faces, " +
+                              std::to_string(samples.barycentrics.size()) + " barycentrics",
+                          "what Renderer::samples() returns");
+}
+
 std::vector<float> interpolate(const Samples& samples, const Attributes& attributes) {
   std::vector<float> values(samples.faces.size() * attributes.channels);
-  interpolate(samples, attributes, values);
+  interpolate(SampleArrays(samples), attributes, values);
   return values;
 }
 
-void interpolate(const Samples& samples, const Attributes& attributes, std::span<float> values) {
+void interpolate(const SampleArrays& samples, const Attributes& attributes, std::span<float> values) {
   const Table table(samples, attributes);
   const std::size_t channels = table.channels();
   if (values.size() != table.count() * channels)
@@ -123,28 +144,41 @@ void interpolate(const Samples& samples, const Attributes& attributes, std::span
         continue;
       }
       const auto corners = table.corners(i);
-      const auto weights = weights_of(samples.barycentrics[i]);
+      const auto weights = weights_of(samples.place(i));
       for (std::size_t c = 0; c < channels; ++c) to[c] = mixed(attributes.values, corners, c, weights);
     }
   });
 }
 
 std::vector<float> interpolate_steps(const Samples& samples, const Attributes& attributes) {
+  std::vector<float> steps(2 * samples.faces.size() * attributes.channels);
+  interpolate_steps(SampleArrays(samples), attributes, steps);
+  return steps;
+}
+
+void interpolate_steps(const SampleArrays& samples, const Attributes& attributes, std::span<float> steps) {
   const Table table(samples, attributes);
   table.require_steps();
-  std::vector<float> found(2 * table.count() * table.channels());
-  for (std::size_t i = 0; i < table.count(); ++i) {
-    if (table.is_empty(i)) continue;
-    const auto corners = table.corners(i);
-    const vec4& step = samples.steps[i];
-    const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
-    for (std::size_t c = 0; c < table.channels(); ++c) {
-      float* to = &found[2 * (i * table.channels() + c)];
-      to[0] = mixed(attributes.values, corners, c, right);
-      to[1] = mixed(attributes.values, corners, c, down);
+  const std::size_t channels = table.channels();
+  if (steps.size() != 2 * table.count() * channels)
+    throw InvalidArgument("steps (interpolate)", std::to_string(steps.size()),
+                          std::to_string(2 * table.count() * channels));
+  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const std::span<float> to = steps.subspan(2 * i * channels, 2 * channels);
+      if (table.is_empty(i)) {
+        std::ranges::fill(to, 0.0F);
+        continue;
+      }
+      const auto corners = table.corners(i);
+      const vec4 step = samples.step(i);
+      const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+      for (std::size_t c = 0; c < channels; ++c) {
+        to[2 * c] = mixed(attributes.values, corners, c, right);
+        to[2 * c + 1] = mixed(attributes.values, corners, c, down);
+      }
     }
-  }
-  return found;
+  });
 }
 
 namespace {
@@ -159,7 +193,7 @@ std::size_t parts_of(const Table& table, std::size_t numbers) {
 /// Samples of one face beside each other: what they add to its corners, a few channels at a time.
 class Run {
  public:
-  Run(const Table& table, const Samples& samples, const Attributes& attributes)
+  Run(const Table& table, const SampleArrays& samples, const Attributes& attributes)
       : table_(table), samples_(samples), attributes_(attributes) {}
 
   /// To the rows of `values` and the gradients of the barycentrics, of samples from `first` up to `last`.
@@ -176,7 +210,7 @@ class Run {
         by_second[c] = of[corners[2] + c] - of[corners[0] + c];
       }
       for (std::size_t i = first; i < last; ++i) {
-        const auto weights = weights_of(samples_.barycentrics[i]);
+        const auto weights = weights_of(samples_.place(i));
         const float* const grad = &grad_values[i * channels + from];
         vec2 by_place(0);
         for (std::size_t c = 0; c < count; ++c) {
@@ -190,18 +224,24 @@ class Run {
     }
   }
 
-  void add_steps(std::span<const float> grad_steps, std::size_t first, std::size_t last,
-                 float* values) const {
+  void add_steps(std::span<const float> grad_steps, std::size_t first, std::size_t last, float* values,
+                 std::span<vec4> steps) const {
     const std::size_t channels = table_.channels();
     const auto corners = table_.corners(first);
+    const float* const of = attributes_.values.data();
     for (std::size_t i = first; i < last; ++i) {
-      const vec4& step = samples_.steps[i];
+      const vec4 step = samples_.step(i);
       const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+      vec4 by_step(0);
       for (std::size_t c = 0; c < channels; ++c) {
         const float* const of_step = &grad_steps[2 * (i * channels + c)];
         for (std::size_t k = 0; k < 3; ++k)
           values[corners[k] + c] += of_step[0] * right[k] + of_step[1] * down[k];
+        const float at_first = of[corners[0] + c];
+        const vec2 grad(of_step[0], of_step[1]);
+        by_step += vec4(grad * (of[corners[1] + c] - at_first), grad * (of[corners[2] + c] - at_first));
       }
+      steps[i] = by_step;
     }
   }
 
@@ -209,13 +249,19 @@ class Run {
   static constexpr std::size_t k_together = 16;
 
   const Table& table_;
-  const Samples& samples_;
+  const SampleArrays& samples_;
   const Attributes& attributes_;
 };
 
 }  // namespace
 
 InterpolateGradient interpolate_backward(const Samples& samples, const Attributes& attributes,
+                                         std::span<const float> grad_values,
+                                         std::span<const float> grad_steps) {
+  return interpolate_backward(SampleArrays(samples), attributes, grad_values, grad_steps);
+}
+
+InterpolateGradient interpolate_backward(const SampleArrays& samples, const Attributes& attributes,
                                          std::span<const float> grad_values,
                                          std::span<const float> grad_steps) {
   const Table table(samples, attributes);
@@ -225,7 +271,8 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
     checks::require_numbers(grad_steps, 2 * grad_values.size(), "grad_steps (interpolate)");
   }
   const std::size_t numbers = attributes.values.size(), parts = parts_of(table, numbers);
-  InterpolateGradient found{std::vector<float>(numbers), std::vector<vec2>(table.count())};
+  InterpolateGradient found{std::vector<float>(numbers), std::vector<vec2>(table.count()),
+                            std::vector<vec4>(grad_steps.empty() ? 0 : table.count())};
   std::vector<float> others((parts - 1) * numbers);
   const Run run(table, samples, attributes);
   const auto add_part = [&](std::size_t part) {
@@ -235,7 +282,7 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
       last = std::min(table.end_of_run(i), end);
       if (table.is_empty(i)) continue;
       run.add(grad_values, i, last, values, found.barycentrics);
-      if (!grad_steps.empty()) run.add_steps(grad_steps, i, last, values);
+      if (!grad_steps.empty()) run.add_steps(grad_steps, i, last, values, found.steps);
     }
   };
   const auto add = [&](std::size_t first_part, std::size_t last_part) {
@@ -252,6 +299,12 @@ InterpolateGradient interpolate_backward(const Samples& samples, const Attribute
 std::vector<float> interpolate_tangent(const Samples& samples, const Attributes& attributes,
                                        std::span<const float> value_tangents,
                                        std::span<const vec2> barycentric_tangents) {
+  return interpolate_tangent(SampleArrays(samples), attributes, value_tangents, barycentric_tangents);
+}
+
+std::vector<float> interpolate_tangent(const SampleArrays& samples, const Attributes& attributes,
+                                       std::span<const float> value_tangents,
+                                       std::span<const vec2> barycentric_tangents) {
   const Table table(samples, attributes);
   if (!value_tangents.empty())
     checks::require_numbers(value_tangents, attributes.values.size(), "value_tangents (interpolate)");
@@ -262,7 +315,7 @@ std::vector<float> interpolate_tangent(const Samples& samples, const Attributes&
   for (std::size_t i = 0; i < table.count(); ++i) {
     if (table.is_empty(i)) continue;
     const auto corners = table.corners(i);
-    const auto weights = weights_of(samples.barycentrics[i]);
+    const auto weights = weights_of(samples.place(i));
     const vec2 moved = barycentric_tangents.empty() ? vec2(0) : barycentric_tangents[i];
     for (std::size_t c = 0; c < table.channels(); ++c) {
       float& tangent = found[i * table.channels() + c];

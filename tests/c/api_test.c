@@ -1091,6 +1091,65 @@ static void test_own_texture(void) {
 }
 
 /* A triangle by its positions in clip space, under z = 1.2 w - 2.2: a frame's image and gradient, and those of a step. */
+/* What nvdiffrast calls rast and rast_db, of a frame of one triangle: by the interpolation of z and w, and of u and v. */
+static void check_rast(dpr_frame* frame, const dpr_array* given, const float* positions) {
+  static float rast[FLOATS], rast_db[FLOATS], values[FLOATS], steps[2 * FLOATS], of_rast[FLOATS],
+      of_db[FLOATS];
+  float attributes[12], of_attributes[12];
+  int64_t firsts[] = {6};
+  int32_t of_seventh[21] = {0};
+  dpr_array arrays[] = {given[0], given[1], {"firsts", firsts, DPR_INT64, 1, {1}}};
+  dpr_array outputs[] = {{"rast", rast, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}},
+                         {"rast_db", rast_db, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}}};
+  const dpr_array samples[] = {outputs[0],
+                               outputs[1],
+                               {"attributes", attributes, DPR_FLOAT32, 2, {3, 4}},
+                               {"faces", of_seventh, DPR_INT32, 2, {7, 3}}};
+  const dpr_array found[] = {{"values", values, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}},
+                             {"steps", steps, DPR_FLOAT32, 4, {1, SIDE, SIDE, 8}}};
+  const dpr_array gradients[] = {{"attributes", of_attributes, DPR_FLOAT32, 2, {3, 4}},
+                                 {"rast", of_rast, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}},
+                                 {"rast_db", of_db, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}}};
+  double by_attributes = 0, by_samples = 0, size = 0;
+  int i, k, covered = 0;
+  for (k = 0; k < 3; ++k) {
+    attributes[4 * k] = positions[4 * k + 2], attributes[4 * k + 1] = positions[4 * k + 3];
+    attributes[4 * k + 2] = k == 0, attributes[4 * k + 3] = k == 1;
+    of_seventh[18 + k] = k;
+  }
+  OK(dpr_clip_space_rast(frame, arrays, 3, outputs, 2));
+  OK(dpr_interpolate(samples, 4, found, 2));
+  for (i = 0; i < SIDE * SIDE; ++i) {
+    const float *const at = rast + 4 * i, *const value = values + 4 * i;
+    if (at[3] == 0) {
+      for (k = 0; k < 4; ++k) EXPECT(at[k] == 0 && rast_db[4 * i + k] == 0 && value[k] == 0);
+      continue;
+    }
+    ++covered;
+    EXPECT(at[3] == 7 && fabsf(value[0] / value[1] - at[2]) < 1e-5f);
+    EXPECT(fabsf(value[2] - at[0]) < 1e-6f && fabsf(value[3] - at[1]) < 1e-6f);
+    for (k = 0; k < 4; ++k) EXPECT(fabsf(steps[8 * i + 4 + k] - rast_db[4 * i + k]) < 1e-5f);
+  }
+  EXPECT(covered > SIDE);
+  /* Linear in the attributes; and in u, v and their steps, apart from what corner 2 has of everything. */
+  for (i = 0; i < SIDE * SIDE; ++i)
+    for (k = 0; k < 8; ++k)
+      steps[8 * i + k] *= cosf((float)(8 * i + k)), values[4 * i + k / 2] *= k % 2 ? 0.5f : 1;
+  OK(dpr_interpolate_backward(samples, 4, found, 2, gradients, 3));
+  for (k = 0; k < 12; ++k) by_attributes += (double)of_attributes[k] * (double)attributes[k];
+  for (i = 0; i < FLOATS; ++i) {
+    const double of_last = i % 4 ? 0 : (double)(values[i] * attributes[8] + values[i + 1] * attributes[9]);
+    const double term = (double)of_rast[i] * (double)rast[i] + (double)of_db[i] * (double)rast_db[i];
+    by_samples += term + (rast[i / 4 * 4 + 3] > 0 ? of_last : 0), size += fabs(term);
+  }
+  EXPECT(size > 1 && fabs(by_attributes - by_samples) < 1e-4 * size);
+  arrays[0].shape[1] = 2;
+  REFUSED(dpr_clip_space_rast(frame, arrays, 3, outputs, 2), "indices below 2");
+  REFUSED(dpr_clip_space_rast(frame, arrays + 1, 2, outputs, 2), "positions");
+  arrays[0].shape[1] = 3, outputs[1].shape[3] = 3;
+  REFUSED(dpr_clip_space_rast(frame, arrays, 3, outputs, 2), "rast_db");
+}
+
 static void test_clip_space(void) {
   static float pixels[FLOATS], moved[FLOATS], weights[FLOATS];
   float positions_of_clip[] = {-1.5f, -1.2f, 1.4f, 3, 1.4f, -1, 2.6f, 4, 0.2f, 1.3f, 0.8f, 2.5f};
@@ -1140,6 +1199,7 @@ static void test_clip_space(void) {
       of_positions.name = "positions", of_positions.shape[1] = 2;
       REFUSED(dpr_clip_space_backward(clip, &gradient, &of_positions), "positions");
       REFUSED(dpr_clip_space_read(clip, given, 1), "vertices, views, intrinsics, planes or scales");
+      check_rast(frame, given, positions_of_clip);
     } else {
       for (i = 0; i < FLOATS; ++i)
         by_step += (side == 1 ? 1.0 : -1.0) * (double)weights[i] * (double)moved[i];

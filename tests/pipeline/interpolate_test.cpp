@@ -214,6 +214,11 @@ TEST_SUITE("pipeline") {
       const InterpolateGradient with_steps = interpolate_backward(samples, attributes, grad, grad_steps);
       const double by_steps = dot(with_steps.values, values) - dot(inside.values, values);
       CHECK(by_steps == doctest::Approx(dot(grad_steps, steps)).epsilon(1e-4));
+      // And in the steps of barycentrics.
+      double by_own_steps = 0;
+      for (std::size_t i = 0; i < samples.steps.size(); ++i)
+        by_own_steps += static_cast<double>(glm::dot(with_steps.steps[i], samples.steps[i]));
+      CHECK(by_own_steps == doctest::Approx(dot(grad_steps, steps)).epsilon(1e-4));
       // Each view's own: the second view's attributes do not reach the first.
       if (!is_by_view) continue;
       std::vector<float> others = values;
@@ -239,7 +244,8 @@ TEST_SUITE("pipeline") {
                           "faces[1] (interpolate): got 3");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {std::span(faces).first(1), values, 1}),
                           "expected more than 1");
-    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 2}), "attributes (interpolate)");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 2}),
+                          "attributes (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, values, 0}),
                           "channels (interpolate)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, interpolate(samples, {faces, bad, 1}), "attributes (interpolate)");

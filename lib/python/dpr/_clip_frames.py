@@ -1,14 +1,16 @@
 """Samples of positions in clip space, for the operations of nvdiffrast."""
 import collections
 
+import numpy as np
 import torch
+from torch.autograd.function import once_differentiable
 
-from . import _clip_space, _merged, _rows, _torch
+from . import _arrays, _clip_space, _merged, _rows, _torch
+from ._rasterized import Rasterized
 from ._renderer import Renderer
 
 _SHARP = {"preset": "pixel", "sigma": 1e-12, "gamma": 1e-9}
 """Blends samples across contours over one pixel without a further blur. Only the nearest surface is visible."""
-_PLANE_ROUNDING = 1e-6
 
 
 class _Frame:
@@ -26,8 +28,10 @@ class _Frame:
         renderer = Renderer(width, height, device=device, znear=camera.znear, zfar=camera.zfar, **_SHARP)
         self._camera = camera
         views_and_intrinsics = camera.views_and_intrinsics(len(pos), width, height)
-        self._samples = renderer._rasterize(self.vertices, faces, *views_and_intrinsics, layers).layers[-1]
-        self._has_gradient = self.vertices.requires_grad
+        spec, plan = renderer._plan_samples(self.vertices, faces, *views_and_intrinsics, layers)
+        self._tensors = [torch.as_tensor(leaf) for leaf in plan.leaves]
+        wanted = [i for i, tensor in enumerate(self._tensors) if tensor.requires_grad]
+        self._rasterized = Rasterized(spec, [_arrays.to_numpy(tensor) for tensor in self._tensors], wanted)
 
     def _placed(self, pos):
         used = torch.full((pos.shape[1],), self.faces.ndim == 3)
@@ -37,40 +41,52 @@ class _Frame:
         camera = _clip_space.camera_of(pos, faces, (self._height, self._width), "dpr.nvdiffrast." + self._call)
         return camera, camera.vertices(pos, used, self._width, self._height)
 
-    def _inner(self, samples):
-        margin = self._samples.margin
-        return samples[:, margin:margin + self._height, margin:margin + self._width]
-
     def rast(self, pos, grad_db):
         """([N, H, W, 4], [N, H, W, 4])"""
-        samples, count_of_faces = self._samples, self.faces.shape[-2]
-        faces = self.faces.long().reshape(-1, 3)
-        face_id, barycentrics, depth = map(self._inner, (samples.face_id, samples.barycentrics, samples.depth))
-        count = face_id.numel()
-        covered = (face_id >= 0).reshape(-1).nonzero()[:, 0]
-        face = face_id.reshape(-1).index_select(0, covered)
+        return _Rast.apply(self, grad_db, pos, *self._tensors)
+
+    def find(self, pos):
+        """The same of NumPy's."""
+        firsts = np.broadcast_to(np.asarray(self.firsts, np.int64), len(pos))
+        return self._rasterized.clip_space_rast(*map(np.ascontiguousarray, (pos, _arrays.to_numpy(self.faces), firsts)))
+
+    def _inner(self, samples):
+        margin = self._rasterized.raster.margin
+        return samples[:, margin:margin + self._height, margin:margin + self._width]
+
+    def gradients(self, pos, rast, grad_rast, grad_db):
+        """(gradient of pos, if it has one by itself, [those of the frame's tensors])"""
+        raster, of_pos = self._rasterized.raster, None
+        grad = torch.zeros(len(pos), raster.height, raster.width, 3)
+        inner = self._inner(grad)
+        if self._camera.is_perspective and grad_db is None:
+            inner[..., :2] = grad_rast[..., :2]
+        else:
+            covered = (rast[..., 3] > 0).reshape(-1).nonzero()[:, 0]
+            of_pos, of_weights = self._gradients_at(pos, covered, grad_rast, grad_db)
+            inner += _rows.spread(of_weights, covered, rast[..., 0].numel()).reshape(inner.shape)
+        found = self._rasterized.gradients_of_layer(raster.layers - 1, (None, grad, None))
+        return of_pos, [torch.from_numpy(found[i]) if i in found else None for i in range(len(self._tensors))]
+
+    def _gradients_at(self, pos, covered, grad_rast, grad_db):
+        """Gradients of pos, apart from its part in the samples, and of their weights [K, 3], at covered pixels [K]."""
+        inner = [self._inner(torch.from_numpy(output[-1])) for output in self._rasterized.outputs[:2]]
+        face_id, barycentrics = (output.reshape(-1, *output.shape[3:])[covered] for output in inner)
         shape = covered.div(self._height * self._width, rounding_mode="floor")
-        row = face + shape * count_of_faces if self.faces.ndim == 3 else face
-        corners = [corner.contiguous() for corner in
-                   (faces.index_select(0, row) + (shape * pos.shape[1])[:, None]).unbind(1)]
-        weights = _rows.rows(barycentrics.reshape(-1, 3), covered)
-        of_w = pos[..., 3].reshape(-1)
-        if self._camera.is_perspective:
-            own = weights.detach().unbind(1)
-            z, w = (sum(table.index_select(0, corner) * weight for corner, weight in zip(corners, own))
-                    for table in (pos[..., 2].detach().reshape(-1), of_w.detach()))
-            of_depth = z / w
-        else:  # an orthographic camera's weights are linear on the screen
-            of_depth = depth.detach().reshape(-1).index_select(0, covered) - 2
-            weights = weights / torch.stack([of_w.index_select(0, corner) for corner in corners], 1)
-            weights = weights / weights.sum(1, keepdim=True)
-        is_seen = of_depth.abs() <= 1 + _PLANE_ROUNDING
-        number = (face + 1 + self.firsts.index_select(0, shape)).to(pos.dtype)
-        found = torch.cat([weights[:, :2], of_depth[:, None], number[:, None]], 1) * is_seen[:, None]
-        derivatives = self._derivatives(*((pos, weights) if grad_db else (pos.detach(), weights.detach())), corners,
-                                        shape * count_of_faces + face)
-        return tuple(_rows.spread(table, covered, count).reshape(*face_id.shape, 4)
-                     for table in (found, derivatives * is_seen[:, None]))
+        place = face_id + shape * self.faces.shape[-2]
+        faces = self.faces.long().reshape(-1, 3).index_select(0, place if self.faces.ndim == 3 else face_id)
+        corners = [corner.contiguous() for corner in (faces + (shape * pos.shape[1])[:, None]).unbind(1)]
+        with torch.enable_grad():
+            pos, barycentrics = pos.detach().requires_grad_(), barycentrics.requires_grad_()
+            weights = barycentrics
+            if not self._camera.is_perspective:  # whose weights are linear on the screen
+                of_w = pos[..., 3].reshape(-1)
+                weights = weights / torch.stack([of_w.index_select(0, corner) for corner in corners], 1)
+                weights = weights / weights.sum(1, keepdim=True)
+            found = [(weights[:, :2], grad_rast, 2), (self._derivatives(pos, weights, corners, place), grad_db, 4)]
+            outputs, grads = zip(*((own, grad.reshape(-1, 4).index_select(0, covered)[:, :count])
+                                   for own, grad, count in found if grad is not None))
+            return torch.autograd.grad(outputs, (pos, barycentrics), grads, allow_unused=True)
 
     def _derivatives(self, pos, weights, corners, place):
         """[K, 4]: du/dX, du/dY, dv/dX, dv/dY per pixel, of weights [K, 3]. place: shape times faces plus face."""
@@ -90,18 +106,18 @@ class _Frame:
         """The camera's vertices for positions [N, V, 4], differentiable; None if the samples belong to other positions,
         or lack gradients that are wanted."""
         is_wanted = pos.requires_grad and torch.is_grad_enabled()
-        if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self._has_gradient:
+        if pos.shape[:2] != self.vertices.shape[:2] or is_wanted and not self.vertices.requires_grad:
             return None
         vertices = self._placed(pos)[1]
         return vertices if torch.equal(vertices, self.vertices) else None
 
     def antialias(self, color, vertices, boost):
-        margin = self._samples.margin
+        margin = self._rasterized.raster.margin
         if boost != 1:
             vertices = vertices.detach() + boost * (vertices - vertices.detach())
-        tensors = [vertices if tensor is self.vertices else tensor for tensor in self._samples._tensors]
+        tensors = [vertices if tensor is self.vertices else tensor for tensor in self._tensors]
         around = torch.nn.functional.pad(color.permute(0, 3, 1, 2), (margin,) * 4, mode="replicate").permute(0, 2, 3, 1)
-        return _torch.resolve(self._samples._rasterized, around, tensors)
+        return _torch.resolve(self._rasterized, around, tensors)
 
 
 def _slopes(corners):
@@ -111,6 +127,29 @@ def _slopes(corners):
     area = (lines[:, 0] * places[:, 0]).sum(1)
     slopes = lines[..., :2] / torch.where(area == 0, torch.ones_like(area), area)[:, None, None]
     return torch.cat([slopes[:, 0], slopes[:, 1], slopes.sum(1)], 1).to(corners.dtype)
+
+
+class _Rast(torch.autograd.Function):
+    """(frame, whether rast_db has gradients, pos [N, V, 4], the frame's tensors) to rast and rast_db."""
+
+    @staticmethod
+    def forward(ctx, frame, grad_db, pos, *tensors):
+        rast, rast_db = map(torch.from_numpy, frame.find(_arrays.to_numpy(pos)))
+        ctx.frame = frame
+        ctx.save_for_backward(pos, rast, *tensors)
+        ctx.set_materialize_grads(False)
+        if not grad_db:
+            ctx.mark_non_differentiable(rast_db)
+        return rast, rast_db
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, grad_rast, grad_db):
+        pos, rast, *tensors = ctx.saved_tensors
+        if grad_rast is None and grad_db is None:
+            return (None,) * (3 + len(tensors))
+        of_pos, found = ctx.frame.gradients(pos, rast, grad_rast, grad_db)
+        return (None, None, of_pos, *found)
 
 
 class _Part:
@@ -181,7 +220,7 @@ class Frames:
 
     def rast(self, pos, grad_db):
         """([N, H, W, 4], [N, H, W, 4])"""
-        empty = pos.new_zeros(len(pos) if self.ranges is None else len(self.ranges), *self._size, 4)
+        empty = pos.new_zeros(()).expand(len(pos) if self.ranges is None else len(self.ranges), *self._size, 4)
         found = [part.frame.rast(part.positions(pos), grad_db) for part in self._parts]
         return self._in_order([rast for rast, _ in found], empty), self._in_order([db for _, db in found], empty)
 

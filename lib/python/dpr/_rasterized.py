@@ -47,6 +47,13 @@ class Rasterized:
         _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, found)))
         return found
 
+    def clip_space_rast(self, positions, faces, firsts):
+        """What nvdiffrast's rasterize() returns of the last layer; arguments as dpr_clip_space_rast() has them."""
+        arrays = [("positions", positions), ("faces", faces), ("firsts", firsts)]
+        found = [(name, np.empty((*self._image_size, 4), np.float32)) for name in ("rast", "rast_db")]
+        _library.call("dpr_clip_space_rast", self._frame.handle, *_frames.c_arrays(arrays), *_frames.c_arrays(found))
+        return [array for _, array in found]
+
     def _gradients(self, function, *arguments):
         """{leaf: gradient} that a function of the library computes."""
         totals = {leaf: np.zeros(self._shapes[leaf], np.float32) for leaf in self.leaves}
@@ -178,27 +185,39 @@ def _checked(name, array, shape):
     return array
 
 
-def _at_samples(face_id, barycentrics, attributes, faces):
-    """Attributes [V, C] or [N, V, C] and what they are interpolated by, as the library has them."""
+def _at_samples(samples, attributes, faces):
+    """Attributes [V, C] or [N, V, C] and what they are interpolated by, as the library has them. samples: {name: array}"""
     if attributes.ndim == 3 and len(attributes) == 1:
         attributes = attributes[0]
-    return [("face_id", np.ascontiguousarray(face_id)), ("barycentrics", np.ascontiguousarray(barycentrics)),
-            ("attributes", np.ascontiguousarray(attributes)), ("faces", np.ascontiguousarray(faces.clip(0)))]
+    arrays = {**samples, "attributes": attributes, "faces": faces.clip(0)}
+    return [(name, np.ascontiguousarray(array)) for name, array in arrays.items()]
+
+
+def interpolated_at(samples, attributes, faces, outputs):
+    """{name: array} of "values" and "steps". samples: {name: array}, as dpr_interpolate() takes them."""
+    named = _at_samples(samples, attributes, faces)  # which the library reads
+    size, channels = next(iter(samples.values())).shape[:3], attributes.shape[-1]
+    found = {name: np.empty((*size, channels * (2 if name == "steps" else 1)), np.float32) for name in outputs}
+    _library.call("dpr_interpolate", *_frames.c_arrays(named), *_frames.c_arrays(list(found.items())))
+    return found
+
+
+def interpolated_gradients_at(samples, attributes, faces, grads):
+    """{name: array} of the samples' floats and the attributes. grads: {name: array} of the outputs."""
+    named, grads = _at_samples(samples, attributes, faces), {name: np.ascontiguousarray(grad) for name, grad in grads.items()}
+    found = {name: np.empty(array.shape, np.float32) for name, array in named if name not in ("face_id", "faces")}
+    _library.call("dpr_interpolate_backward", *_frames.c_arrays(named), *_frames.c_arrays(list(grads.items())),
+                  *_frames.c_arrays(list(found.items())))
+    return {**found, "attributes": found["attributes"].reshape(attributes.shape)}
 
 
 @_arrays.named("dpr.Samples")
 def interpolated(face_id, barycentrics, attributes, faces):
     """Attributes at samples of one layer, [N, h, w, C]; 0 where nothing is."""
-    named = _at_samples(face_id, barycentrics, attributes, faces)  # which the library reads
-    values = np.empty((*face_id.shape, attributes.shape[-1]), np.float32)
-    _library.call("dpr_interpolate", *_frames.c_arrays(named), *_frames.c_arrays([("values", values)]))
-    return values
+    return interpolated_at({"face_id": face_id, "barycentrics": barycentrics}, attributes, faces, ["values"])["values"]
 
 
 def interpolated_gradients(face_id, barycentrics, attributes, faces, grad):
     """(those of barycentrics, those of attributes)"""
-    named, grad = _at_samples(face_id, barycentrics, attributes, faces), np.ascontiguousarray(grad)
-    found = [("barycentrics", np.empty(barycentrics.shape, np.float32)), ("attributes", np.empty(named[2][1].shape, np.float32))]
-    _library.call("dpr_interpolate_backward", *_frames.c_arrays(named),
-                  *_frames.c_arrays([("values", grad)]), *_frames.c_arrays(found))
-    return found[0][1], found[1][1].reshape(attributes.shape)
+    found = interpolated_gradients_at({"face_id": face_id, "barycentrics": barycentrics}, attributes, faces, {"values": grad})
+    return found["barycentrics"], found["attributes"]

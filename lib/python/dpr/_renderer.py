@@ -244,15 +244,14 @@ class Renderer:
             image = samples.resolve(my_shader(normals))  # [N, height, width, C]
         """
         _plan.require_names(misspelt, ("layers", "copy"))
-        samples = self._rasterize(vertices, faces, views, intrinsics, layers, copy)
+        samples = _samples.rasterize(*self._plan_samples(vertices, faces, views, intrinsics, layers, copy), copy)
         if samples._rasterized.warning:
             _library.warn(samples._rasterized.warning)
         return samples
 
-    def _rasterize(self, vertices, faces, views, intrinsics, layers, copy=False):
+    def _plan_samples(self, vertices, faces, views, intrinsics, layers, copy=False):
         spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one=True)
-        spec = spec._replace(settings=(*spec.settings, _plan.setting("layers", layers)))
-        return _samples.rasterize(spec, plan, copy)
+        return spec._replace(settings=(*spec.settings, _plan.setting("layers", layers))), plan
 
     def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
                   texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,

@@ -19,8 +19,9 @@ from typing import Any, List, Optional, Sequence, Tuple, Union
 
 import torch
 from torch import Tensor
+from torch.autograd.function import once_differentiable
 
-from . import _arrays, _rows
+from . import _arrays, _rasterized
 from ._clip_frames import Frames
 from ._texture import Mip, check_floats, texture, texture_construct_mip
 
@@ -212,6 +213,30 @@ def _chosen(diff_attrs, channels):
     return [int(i) % channels for i in diff_attrs]
 
 
+class _Interpolate(torch.autograd.Function):
+    """(names of the outputs, attributes [1 or N, V, A], rast, rast_db or None, tri) to the outputs."""
+
+    @staticmethod
+    def _arrays(attr, rast, rast_db, tri):
+        samples = {"rast": rast} if rast_db is None else {"rast": rast, "rast_db": rast_db}
+        return {name: _arrays.to_numpy(tensor) for name, tensor in samples.items()}, *map(_arrays.to_numpy, (attr, tri))
+
+    @staticmethod
+    def forward(ctx, names, *tensors):
+        ctx.names = names
+        ctx.save_for_backward(*tensors)
+        found = _rasterized.interpolated_at(*_Interpolate._arrays(*tensors), names)
+        return tuple(map(torch.from_numpy, found.values()))
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, *grads):
+        given = {name: _arrays.to_numpy(grad) for name, grad in zip(ctx.names, grads)}
+        found = _rasterized.interpolated_gradients_at(*_Interpolate._arrays(*ctx.saved_tensors), given)
+        names = zip(("attributes", "rast", "rast_db"), ctx.needs_input_grad[1:])
+        return None, *(torch.from_numpy(found[name]) if wanted else None for name, wanted in names), None
+
+
 def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tensor] = None,
                 diff_attrs: Union[str, Sequence[int], None] = None) -> Tuple[Tensor, Tensor]:
     """Interpolates attributes of vertices, attr [V, A], [1, V, A] or [N, V, A].
@@ -226,31 +251,21 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
     shape, channels = rast.shape[:3], attr.shape[-1]
     if len(table) not in (1, shape[0]):
         _fail("attr", list(attr.shape), f"[V, A], or 1 or {shape[0]} in the first dimension", "interpolate")
-    flat = rast.reshape(-1, 4)
-    covered = (flat[:, 3] > 0).nonzero()[:, 0]
-    faces = flat.detach()[:, 3].index_select(0, covered).long() - 1
-    if len(faces) and int(faces.max()) >= len(tri):
-        _fail("tri", list(tri.shape), f"the triangles of rast, at least {int(faces.max()) + 1}", "interpolate")
-    corners = tri.long().index_select(0, faces)
-    if len(table) > 1:
-        corners = corners + (covered.div(shape[1] * shape[2], rounding_mode="floor") * table.shape[1])[:, None]
-    table, corners = table.reshape(-1, channels), corners.t().contiguous()
-    u, v = (flat[:, i].index_select(0, covered) for i in (0, 1))
-    values = _rows.mixed(table, corners, torch.stack([u, v, 1 - u - v]))
-    found = _rows.spread(values, covered, len(flat)).reshape(*shape, channels)
-    if diff_attrs is None or len(diff_attrs) == 0:
-        return found, rast.new_empty(*shape, 0)
-    chosen = _chosen(diff_attrs, channels)
+    numbers_of_rast = rast.detach()[..., 3]
+    if bool((numbers_of_rast > len(tri)).any()):
+        _fail("tri", list(tri.shape), f"the triangles of rast, at least {float(numbers_of_rast.max()):g}", "interpolate")
+    chosen = [] if diff_attrs is None or len(diff_attrs) == 0 else _chosen(diff_attrs, channels)
+    if not chosen:
+        values, = _Interpolate.apply(("values",), table, rast, None, tri)
+        return values, rast.new_empty(*shape, 0)
     if rast_db is None or rast_db.shape != rast.shape:
         got = None if rast_db is None else list(rast_db.shape)
         _fail("rast_db", got, f"{list(rast.shape)} with diff_attrs", "interpolate")
-    chosen_table = table if chosen == list(range(channels)) else table[:, chosen]
-    derivatives = []
-    for axis in (0, 1):  # X, Y
-        of_u, of_v = (rast_db.reshape(-1, 4)[:, i].index_select(0, covered) for i in (axis, axis + 2))
-        derivatives.append(_rows.mixed(chosen_table, corners, torch.stack([of_u, of_v, -of_u - of_v])))
-    derivatives = torch.stack(derivatives, 2).reshape(-1, 2 * len(chosen))
-    return found, _rows.spread(derivatives, covered, len(flat)).reshape(*shape, 2 * len(chosen))
+    if chosen == list(range(channels)):
+        return _Interpolate.apply(("values", "steps"), table, rast, rast_db, tri)
+    values, = _Interpolate.apply(("values",), table, rast, None, tri)
+    steps, = _Interpolate.apply(("steps",), table[..., chosen], rast, rast_db, tri)
+    return values, steps
 
 
 def antialias(color: Tensor, rast: Tensor, pos: Tensor, tri: Tensor, topology_hash: Optional[_TopologyHash] = None,
