@@ -1,5 +1,7 @@
 #include "image/texture_lookup.hpp"
 
+#include <algorithm>
+#include <array>
 #include <numeric>
 
 #include "base/parallel.hpp"
@@ -72,11 +74,16 @@ bool has_level(const TextureLookup& texture, const TexturePlaces& places) {
 
 void look_up(const TextureLookup& texture, const TexturePlaces& places, std::span<float> values) {
   const std::size_t channels = texture.channels;
-  std::ranges::fill(values, 0.0F);
   const auto read = [&](std::size_t k, const taps::Taps<float>& mixture) {
-    for (const taps::Tap<float>& tap : mixture) {
-      const float* texel = &texture.levels[tap.level].texels[channels * tap.texel];
-      for (std::size_t c = 0; c < channels; ++c) values[channels * k + c] += tap.weight * texel[c];
+    constexpr std::size_t k_together = 4;
+    for (std::size_t first = 0; first < channels; first += k_together) {
+      const std::size_t count = std::min(channels - first, k_together);
+      std::array<float, k_together> sums{};
+      for (const taps::Tap<float>& tap : mixture) {
+        const float* texel = &texture.levels[tap.level].texels[channels * tap.texel + first];
+        for (std::size_t c = 0; c < count; ++c) sums[c] += tap.weight * texel[c];
+      }
+      std::copy_n(sums.begin(), count, &values[channels * k + first]);
     }
   };
   with_form(texture, has_level(texture, places),

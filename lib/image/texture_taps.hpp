@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <unsupported/Eigen/AutoDiff>
 
 #include "image/texture_lookup.hpp"
@@ -152,6 +153,17 @@ void add_level(const TextureLookup& texture, std::size_t level, const OnImage<T>
   }
   const T right = x - static_cast<float>(column), down = y - static_cast<float>(row);
   const T left = 1.0F - right, up = 1.0F - down;
+  if (column >= 0 && row >= 0 && column + 1 < image.width && row + 1 < image.height) {
+    const auto width = static_cast<std::size_t>(image.width);
+    const std::size_t first =
+        (place.face * static_cast<std::size_t>(image.height) + static_cast<std::size_t>(row)) * width +
+        static_cast<std::size_t>(column);
+    to.add(level, first, T(left * up * part));
+    to.add(level, first + 1, T(right * up * part));
+    to.add(level, first + width, T(left * down * part));
+    to.add(level, first + width + 1, T(right * down * part));
+    return;
+  }
   add_texel(texture, level, place.face, column, row, T(left * up * part), to);
   add_texel(texture, level, place.face, column + 1, row, T(right * up * part), to);
   add_texel(texture, level, place.face, column, row + 1, T(left * down * part), to);
@@ -228,6 +240,9 @@ Taps<T> taps_of(const TextureLookup& texture, const Reads& reads, const Inputs& 
     const std::size_t lower = std::min(static_cast<std::size_t>(value_of(level)), last - 1);
     const T part = level - static_cast<float>(lower);
     add_level(texture, lower, place, T(1.0F - part), found);
+    if constexpr (std::is_same_v<T, float>) {
+      if (part == 0) return found;
+    }
     add_level(texture, lower + 1, place, part, found);
   } else {
     add_level(texture, 0, place, T(1), found);
