@@ -27,14 +27,16 @@ kernel void exchange_vectors(const uint vectors, const uint4 from, const uint4 t
 /// in   count     vectors
 /// in   first     the first row
 /// in   layout    uint4  of `packed`, as exchange_vectors has it, whose groups are one vector
+/// in   clean     1: numbers that are not finite become 0
 /// in   packed    float[...], as integers
 /// out  rows      float4[first + count], as integers
-kernel void exchange_unpack(const uint count, const uint first, const uint4 layout,
+kernel void exchange_unpack(const uint count, const uint first, const uint4 layout, const uint clean,
                             global const uint* restrict packed, global uint4* restrict rows) {
   const uint i = (uint)get_global_id(0);
   if (i >= count) return;
   global const uint* in = packed + layout.x + (size_t)i * layout.y;
-  rows[first + i] = (uint4)(in[0], layout.w > 1 ? in[1] : 0, layout.w > 2 ? in[2] : 0, layout.w > 3 ? in[3] : 0);
+  const uint4 row = (uint4)(in[0], layout.w > 1 ? in[1] : 0, layout.w > 2 ? in[2] : 0, layout.w > 3 ? in[3] : 0);
+  rows[first + i] = clean ? select(row, (uint4)(0), (row & 0x7f800000) == 0x7f800000) : row;
 }
 
 kernel void exchange_pack(const uint count, const uint first, const uint4 layout,

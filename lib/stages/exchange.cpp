@@ -41,24 +41,27 @@ void Exchange::take_cameras(const FloatVectors& from, std::size_t count, bool or
 }
 
 void Exchange::give(const FloatVectors& from, std::size_t count, const FloatVectors& to) {
+  copy(from, count, to, false);
+}
+
+void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
   if (are_packed(from) && are_rows(to)) {
     launch_(count, kernel::exchange_unpack{.count = to_uint(count),
                                            .first = to_uint(to.first / 4),
                                            .layout = layout(from),
+                                           .clean = cl_uint{clean},
                                            .packed = BufferRef<cl_uint>(from.buffer),
                                            .rows = BufferRef<cl_uint4>(to.buffer)});
-  } else if (are_rows(from) && are_packed(to)) {
+    return;
+  }
+  if (are_rows(from) && are_packed(to) && !clean) {
     launch_(count, kernel::exchange_pack{.count = to_uint(count),
                                          .first = to_uint(from.first / 4),
                                          .layout = layout(to),
                                          .rows = BufferRef<cl_uint4>(from.buffer),
                                          .packed = BufferRef<cl_uint>(to.buffer)});
-  } else {
-    copy(from, count, to, false);
+    return;
   }
-}
-
-void Exchange::copy(const FloatVectors& from, std::size_t count, const FloatVectors& to, bool clean) {
   launch_(count, kernel::exchange_vectors{.vectors = to_uint(count),
                                           .from = layout(from),
                                           .to = layout(to),
