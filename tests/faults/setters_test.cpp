@@ -222,6 +222,38 @@ TEST_SUITE("robustness") {
     CHECK(faults > 0);
   }
 
+  TEST_CASE("faults: own shading that failed works the next time") {
+    Scene scene = old_scene();
+    scene.smoothing = smoothing_preset("pixel");
+    Renderer renderer(open_device());
+    std::vector<double> seen_samples;
+    const auto shade = [&] {
+      seen_samples.clear();
+      renderer.forward();
+      const Samples samples = renderer.samples(true);
+      const std::vector<float> values(5 * samples.faces.size(), 0.5F), pixels = renderer.resolve(values, 5);
+      const ResolveGradient resolved = renderer.resolve_backward(values, 5, pixels);
+      const SceneGradient inside = renderer.samples_backward(samples.barycentrics, samples.depths);
+      for (const std::vector<float>& numbers : {pixels, resolved.samples, samples.depths})
+        seen_samples.insert(seen_samples.end(), numbers.begin(), numbers.end());
+      for (const SceneGradient* const gradient : {&resolved.scene, &inside})
+        for (const Block& block : blocks_of(*gradient))
+          seen_samples.insert(seen_samples.end(), block.found.begin(), block.found.end());
+    };
+    for (const FaultKind& kind : {opencl_faults(), allocation_faults()}) {
+      renderer.set_scene(scene);
+      shade();
+      const std::vector<double> wanted = seen_samples;
+      const std::size_t faults = sweep(
+          kind, static_cast<std::size_t>(reduced(60, 5)), [&] { renderer.set_scene(scene); }, shade,
+          [&](Ending, std::size_t) {
+            shade();
+            CHECK(same(seen_samples, wanted));
+          });
+      CHECK(faults > 0);
+    }
+  }
+
   TEST_CASE("faults: kernels that do not build leave the old ones") {
     for (const char* const name : {"clBuildProgram", "clCreateProgramWithSource"}) {
       // Programs are kept: a device of its own for each fault.
