@@ -51,11 +51,12 @@ DPR_API dpr_status dpr_frame_resolve_tangent(dpr_frame* frame, size_t directions
                                              size_t tangent_count, const dpr_array* values,
                                              const dpr_array* value_tangents, const dpr_array* images);
 
-/* What nvdiffrast's rasterize() returns, of the last layer of a frame with one sample a
- * pixel and the camera of a dpr_clip_space. Arrays: its positions [N, V, 4]; faces [F, 3], or [N, F, 3] of each; and DPR_INT64
- * "firsts" [N], added to the faces' numbers, if there are some. Outputs: "rast" [N, H, W, 4], weights of the corners 0
- * and 1, z/w, and the face's number plus 1, and "rast_db" [N, H, W, 4], how fast these weights change from pixel to pixel
- * to the right and down, one after the other; all are 0 where nothing is, and beyond z/w of -1 and 1. */
+/* What nvdiffrast's rasterize() returns, of the last layer of a frame with one sample a pixel and the camera of a
+ * dpr_clip_space. Arrays: its positions [N, V, 4]; faces [F, 3], or [N, F, 3] of each shape; and, if the faces' numbers
+ * are to start elsewhere, DPR_INT64 "firsts" [N], which are added to them. Outputs: "rast" [N, H, W, 4], weights of the
+ * corners 0 and 1, z/w, and the face's number plus 1, and "rast_db" [N, H, W, 4], how fast the first weight changes from
+ * pixel to pixel along x and y, then the second. All are 0 where nothing is, and where z/w is not from -1 to 1. Rows are
+ * the frame's: where its views are turned as OpenGL's images are, row 0 is at the bottom. */
 DPR_API dpr_status dpr_clip_space_rast(dpr_frame* frame, const dpr_array* arrays, size_t count,
                                        const dpr_array* outputs, size_t output_count);
 
@@ -68,7 +69,8 @@ DPR_API dpr_status dpr_clip_space_rast(dpr_frame* frame, const dpr_array* arrays
 DPR_API dpr_status dpr_interpolate(const dpr_array* arrays, size_t count, const dpr_array* outputs,
                                    size_t output_count);
 /* The gradients of sum <grads, outputs>, of "attributes", "barycentric_steps" and "barycentrics", which are those of
- * corners 1 and 2: corner 0 has the rest, and gradient 0. */
+ * corners 1 and 2: corner 0 has the rest, and gradient 0. Or of "rast", whose u and v are of corners 0 and 1, and
+ * "rast_db". Grads at samples without a face have no part, and may be anything. */
 DPR_API dpr_status dpr_interpolate_backward(const dpr_array* arrays, size_t count, const dpr_array* grads,
                                             size_t grad_count, const dpr_array* gradients,
                                             size_t gradient_count);

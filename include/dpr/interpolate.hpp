@@ -32,7 +32,7 @@ struct InterpolateGradient {
   std::vector<vec2> barycentrics;  ///< for Renderer::samples_backward()
   std::vector<vec4> steps;         ///< as Samples::steps, where there are grad_steps
 };
-/// grad_steps: [...][channel][2], of interpolate_steps(), or none.
+/// grad_steps: [...][channel][2], of interpolate_steps(), or none. Gradients at samples without a face have no part.
 DPR_API InterpolateGradient interpolate_backward(const Samples& samples, const Attributes& attributes,
                                                  std::span<const float> grad_values,
                                                  std::span<const float> grad_steps = {});

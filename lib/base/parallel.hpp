@@ -16,8 +16,8 @@ inline constexpr std::size_t k_least_of_thread = 1U << 14U;
 template <class Function>
 void in_parallel(std::size_t count, const Function& function,
                  std::size_t least_of_thread = k_least_of_thread) {
-  const std::size_t parts =
-      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, count / least_of_thread + 1);
+  const std::size_t parts = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1,
+                                                    std::max<std::size_t>(count / least_of_thread, 1));
   std::vector<std::future<void>> others;
   for (std::size_t i = 1; i < parts; ++i)
     others.push_back(std::async(

@@ -1,5 +1,8 @@
 // What samples of positions in clip space show, as nvdiffrast has it.
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "base/parallel.hpp"
@@ -13,6 +16,7 @@ namespace dpr::batch {
 namespace {
 
 constexpr float k_plane_rounding = 1e-6F;
+constexpr std::int64_t k_most_number = 1 << 24;  // which floats count to
 
 /// One triangle in clip space.
 class Corners {
@@ -35,7 +39,7 @@ class Corners {
     return weights / (weights.x + weights.y + weights.z);
   }
   float depth(const glm::vec3& weights) const { return glm::dot(z_, weights) / glm::dot(w_, weights); }
-  /// Of u to the right and up, then of v, over pixels of such a size in NDC.
+  /// Of u along x and y, then of v, over pixels of such a size in NDC.
   glm::vec4 steps(const glm::vec3& weights, const glm::vec2& pixel) const {
     const glm::vec2 scale = glm::dot(w_, weights) * pixel;
     return {(of_u_ - weights.x * of_all_) * scale, (of_v_ - weights.y * of_all_) * scale};
@@ -67,7 +71,13 @@ void Batch::clip_space_rast(NamedArrays arrays, NamedArrays outputs) {
       throw InvalidArgument(argument(faces), std::to_string(most),
                             "indices below " + std::to_string(vertices));
   const NamedArray* const firsts = find(arrays, "firsts");
-  if (firsts) require_form(*firsts, Element::int64, {{views}}, "[" + std::to_string(views) + "]");
+  if (firsts) {
+    require_form(*firsts, Element::int64, {{views}}, "[" + std::to_string(views) + "]");
+    for (const std::int64_t first : std::span(static_cast<const std::int64_t*>(firsts->data), views))
+      if (first < 0 || first > k_most_number)
+        throw InvalidArgument(argument(*firsts), std::to_string(first),
+                              "0 to " + std::to_string(k_most_number));
+  }
   const NamedArray &rast = require(outputs, "rast"), &rast_db = require(outputs, "rast_db");
   for (const NamedArray* const output : {&rast, &rast_db})
     require_floats(*output, {views, height, width, 4}, "[N, H, W, 4]");

@@ -27,9 +27,10 @@ class Table {
         attributes.are_of_views ? rows_of_views(attributes.values.size(), attributes.channels, "values") : 0;
     const std::size_t faces = faces_ != 0 ? faces_ : attributes.faces.size();
     const std::size_t rows = row_stride_ != 0 ? row_stride_ : attributes.values.size() / attributes.channels;
-    checks::require_numbers(attributes.values,
-                            (attributes.are_of_views ? views_ : 1) * rows * attributes.channels,
-                            "attributes (interpolate)");
+    if (const std::size_t numbers = (attributes.are_of_views ? views_ : 1) * rows * attributes.channels;
+        attributes.values.size() != numbers)
+      throw InvalidArgument("attributes (interpolate)", std::to_string(attributes.values.size()) + " numbers",
+                            std::to_string(numbers));
     require_faces(faces);
     for (std::size_t i = 0; i < attributes.faces.size(); ++i) {
       const uvec3& face = attributes.faces[i];
@@ -37,6 +38,23 @@ class Table {
       if (largest >= rows)
         throw InvalidArgument(checks::in(checks::element("faces", i), "interpolate"), std::to_string(largest),
                               "indices below " + std::to_string(rows) + ", the rows of attributes");
+    }
+    require_finite(attributes.values, "attributes (interpolate)");
+  }
+
+  /// Throws for numbers that are not finite at a sample with a face: of its corners' rows, or `of_sample` of its own.
+  void require_finite(std::span<const float> numbers, const char* name, std::size_t of_sample = 0) const {
+    if (checks::first_not_finite(numbers) == numbers.size()) return;
+    const auto require = [&](std::size_t first, std::size_t count) {
+      checks::require_numbers(numbers.subspan(first, count), count, name);
+    };
+    for (std::size_t i = 0; i < count(); ++i) {
+      if (is_empty(i)) continue;
+      if (of_sample != 0) {
+        require(i * of_sample, of_sample);
+      } else {
+        for (const std::size_t corner : corners(i)) require(corner, channels());
+      }
     }
   }
 
@@ -265,10 +283,16 @@ InterpolateGradient interpolate_backward(const SampleArrays& samples, const Attr
                                          std::span<const float> grad_values,
                                          std::span<const float> grad_steps) {
   const Table table(samples, attributes);
-  checks::require_numbers(grad_values, table.count() * table.channels(), "grad_values (interpolate)");
+  const auto require = [&](std::span<const float> grads, std::size_t of_sample, const char* name) {
+    if (grads.size() != table.count() * of_sample)
+      throw InvalidArgument(name, std::to_string(grads.size()) + " numbers",
+                            std::to_string(table.count() * of_sample));
+    table.require_finite(grads, name, of_sample);
+  };
+  require(grad_values, table.channels(), "grad_values (interpolate)");
   if (!grad_steps.empty()) {
     table.require_steps();
-    checks::require_numbers(grad_steps, 2 * grad_values.size(), "grad_steps (interpolate)");
+    require(grad_steps, 2 * table.channels(), "grad_steps (interpolate)");
   }
   const std::size_t numbers = attributes.values.size(), parts = parts_of(table, numbers);
   InterpolateGradient found{std::vector<float>(numbers), std::vector<vec2>(table.count()),

@@ -1090,7 +1090,6 @@ static void test_own_texture(void) {
   dpr_frame_destroy(frame);
 }
 
-/* A triangle by its positions in clip space, under z = 1.2 w - 2.2: a frame's image and gradient, and those of a step. */
 /* What nvdiffrast calls rast and rast_db, of a frame of one triangle: by the interpolation of z and w, and of u and v. */
 static void check_rast(dpr_frame* frame, const dpr_array* given, const float* positions) {
   static float rast[FLOATS], rast_db[FLOATS], values[FLOATS], steps[2 * FLOATS], of_rast[FLOATS],
@@ -1146,10 +1145,13 @@ static void check_rast(dpr_frame* frame, const dpr_array* given, const float* po
   arrays[0].shape[1] = 2;
   REFUSED(dpr_clip_space_rast(frame, arrays, 3, outputs, 2), "indices below 2");
   REFUSED(dpr_clip_space_rast(frame, arrays + 1, 2, outputs, 2), "positions");
-  arrays[0].shape[1] = 3, outputs[1].shape[3] = 3;
+  arrays[0].shape[1] = 3, firsts[0] = -1;
+  REFUSED(dpr_clip_space_rast(frame, arrays, 3, outputs, 2), "firsts");
+  firsts[0] = 6, outputs[1].shape[3] = 3;
   REFUSED(dpr_clip_space_rast(frame, arrays, 3, outputs, 2), "rast_db");
 }
 
+/* A triangle by its positions in clip space, under z = 1.2 w - 2.2: a frame's image and gradient, and those of a step. */
 static void test_clip_space(void) {
   static float pixels[FLOATS], moved[FLOATS], weights[FLOATS];
   float positions_of_clip[] = {-1.5f, -1.2f, 1.4f, 3, 1.4f, -1, 2.6f, 4, 0.2f, 1.3f, 0.8f, 2.5f};

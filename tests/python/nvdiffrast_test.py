@@ -133,6 +133,34 @@ class NvdiffrastTest(tensors.TestCase):
             (own_image * random(*image.shape)[i]).sum().backward()
             self.check_close(leaf.grad[vertices], part.grad[0], 1e-5)
 
+    def test_pixels_that_show_nothing_have_no_gradient(self):
+        """Whether their surfaces lie beyond the far plane or not, and whatever the gradient is there."""
+        pos = clip(FLOOR * [1, 0.2, 1], turned(0.0, 0.0, 0)).requires_grad_()
+        tri = torch.from_numpy(FLOOR_FACES)
+        attr = random(5, 2) + 0.1
+        attr[4] = float("nan")  # of no triangle
+        attr.requires_grad_()
+        rast, rast_db = dr.rasterize(CONTEXT, pos, tri, [H, W])
+        empty = rast[..., 3:] == 0
+        self.assertTrue(empty.any() and not empty.all())
+        gradient, = torch.autograd.grad((rast[..., :2] * empty).sum(), pos, retain_graph=True)
+        self.assertEqual(float(gradient.abs().max()), 0.0)
+        values, steps = dr.interpolate(attr, rast, tri, rast_db, "all")
+        wanted = torch.autograd.grad(values.masked_fill(empty, 1).sqrt().sum(), (pos, attr), retain_graph=True)
+        found = torch.autograd.grad(values.sqrt().sum(), (pos, attr), retain_graph=True)  # whose gradient at 0 is infinite
+        for gradient, own in zip(found, wanted):
+            self.assertGreater(own.abs().max(), 0)
+            self.check_close(gradient, own, 1e-6)
+        with self.assertRaisesRegex(ValueError, "attr .*got nan"):
+            dr.interpolate(attr[[4, 1, 2, 3]], rast, tri)
+        first, = torch.autograd.grad(rast[..., 0].sum() + steps.sum(), pos, create_graph=True)
+        with self.assertRaisesRegex(RuntimeError, "no second derivatives"):
+            first.sum().backward()
+        with torch.inference_mode():
+            known, _ = dr.rasterize(CONTEXT, pos.detach(), tri, [H, W])
+        dr.interpolate(attr, known, tri)[0].sum().backward()
+        self.assertTrue((attr.grad[4] == 0).all() and attr.grad.abs().max() > 0)
+
     def test_gradients_of_rast(self):
         """By pos, of u and v and their derivatives, where no pixel changes its triangle."""
         tri = torch.from_numpy(FLOOR_FACES)

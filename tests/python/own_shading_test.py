@@ -283,8 +283,12 @@ class OwnShadingTest(unittest.TestCase):
                     spread[:, samples.mask] = moved
                     np.testing.assert_array_equal(*(samples.resolve_with_jvp(*given)[1]
                                                     for given in ((rows, moved), (values, spread))))
-        with self.assertRaisesRegex(ValueError, rf"values .*got \[{len(rows) - 1}, 3\], expected \[{len(rows)}, C\]"):
+        with self.assertRaisesRegex(ValueError, rf"values .*got \[{len(rows) - 1}, 3\], .*or \[{len(rows)}, C\]"):
             samples.resolve(rows[1:])
+        with self.assertRaisesRegex(ValueError, r"tangents of values .*got \[2, 54, 3\], expected \[K, 55, 3\]"):
+            samples.resolve_with_jvp(rows, moved[:, 1:])
+        with self.assertRaisesRegex(TypeError, "covered .*ndarray"):
+            samples.interpolate([COLORS, COLORS], covered=samples.mask)
         with self.assertWarns(UserWarning):
             nothing = RENDERER.rasterize(TETRAHEDRON + np.float32([99, 0, 0]), FACES, self.views, self.intrinsics)
         rows = nothing.interpolate(COLORS, covered=True)

@@ -3,7 +3,6 @@ import collections
 
 import numpy as np
 import torch
-from torch.autograd.function import once_differentiable
 
 from . import _arrays, _clip_space, _merged, _rows, _torch
 from ._rasterized import Rasterized
@@ -46,7 +45,7 @@ class _Frame:
         return _Rast.apply(self, grad_db, pos, *self._tensors)
 
     def find(self, pos):
-        """The same of NumPy's."""
+        """As NumPy's arrays, of NumPy's."""
         firsts = np.broadcast_to(np.asarray(self.firsts, np.int64), len(pos))
         return self._rasterized.clip_space_rast(*map(np.ascontiguousarray, (pos, _arrays.to_numpy(self.faces), firsts)))
 
@@ -56,13 +55,13 @@ class _Frame:
 
     def gradients(self, pos, rast, grad_rast, grad_db):
         """(gradient of pos, if it has one by itself, [those of the frame's tensors])"""
-        raster, of_pos = self._rasterized.raster, None
+        raster, of_pos, shown = self._rasterized.raster, None, rast[..., 3] > 0  # others are constant
         grad = torch.zeros(len(pos), raster.height, raster.width, 3)
         inner = self._inner(grad)
         if self._camera.is_perspective and grad_db is None:
-            inner[..., :2] = grad_rast[..., :2]
+            torch.where(shown[..., None], grad_rast[..., :2], torch.zeros(()), out=inner[..., :2])
         else:
-            covered = (rast[..., 3] > 0).reshape(-1).nonzero()[:, 0]
+            covered = shown.reshape(-1).nonzero()[:, 0]
             of_pos, of_weights = self._gradients_at(pos, covered, grad_rast, grad_db)
             inner += _rows.spread(of_weights, covered, rast[..., 0].numel()).reshape(inner.shape)
         found = self._rasterized.gradients_of_layer(raster.layers - 1, (None, grad, None))
@@ -143,13 +142,20 @@ class _Rast(torch.autograd.Function):
         return rast, rast_db
 
     @staticmethod
-    @once_differentiable
     def backward(ctx, grad_rast, grad_db):
-        pos, rast, *tensors = ctx.saved_tensors
         if grad_rast is None and grad_db is None:
-            return (None,) * (3 + len(tensors))
-        of_pos, found = ctx.frame.gradients(pos, rast, grad_rast, grad_db)
-        return (None, None, of_pos, *found)
+            return (None,) * (1 + len(ctx.saved_tensors))
+        return (None, None, *_RastGradients.apply(ctx.frame, grad_rast, grad_db, *ctx.saved_tensors))
+
+
+@_torch.one_forward
+class _RastGradients(_torch.Derivative):
+    """(frame, gradients of rast and rast_db, or None, pos, rast, the frame's tensors) to gradients of pos and these."""
+
+    @staticmethod
+    def forward(frame, grad_rast, grad_db, pos, rast, *_):
+        of_pos, found = frame.gradients(pos, rast, grad_rast, grad_db)
+        return (of_pos, *found)
 
 
 class _Part:

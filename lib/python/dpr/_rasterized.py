@@ -47,6 +47,7 @@ class Rasterized:
         _library.call("dpr_frame_samples", self._frame.handle, *_of_layers(zip(_NAMES, found)))
         return found
 
+    @_arrays.named("dpr.nvdiffrast.rasterize")
     def clip_space_rast(self, positions, faces, firsts):
         """What nvdiffrast's rasterize() returns of the last layer; arguments as dpr_clip_space_rast() has them."""
         arrays = [("positions", positions), ("faces", faces), ("firsts", firsts)]

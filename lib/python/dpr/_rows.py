@@ -48,4 +48,3 @@ def rows(table, index):
 def spread(values, index, count):
     """Table [count, C] with rows [K, C] at different indices [K], and 0 elsewhere."""
     return _Spread.apply(values, index, count)
-

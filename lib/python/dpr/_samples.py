@@ -73,6 +73,8 @@ class Samples:
         some of their own. Of a list of meshes both are lists too. covered: only of the M samples where there is a face,
         [M, C] in the order of x[mask], so that a shader works on no others; resolve() takes its values so. Not within
         jax.jit(), which knows no M. Raises ValueError for other shapes and indices."""
+        if not isinstance(covered, (bool, np.bool_)):
+            _arrays.fail(TypeError, "covered", type(covered).__name__, "True or False", "dpr.Samples")
         attributes, faces = self._tables_of(attributes, faces)
         if covered:
             found = self._interpolated(*self._covered_alone(attributes, faces))
@@ -95,6 +97,9 @@ class Samples:
     @functools.cached_property
     def _covered(self):
         """Places of the samples with a face, among all views' samples."""
+        if self._is_of_jax and isinstance(self.face_id, sys.modules["jax"].core.Tracer):
+            _arrays.fail(ValueError, "covered samples", "a call within jax.jit() or jax.vmap()", "one outside: their number "
+                         "is not known there", "dpr.Samples")
         face_id = self.face_id if self._is_of_jax else self._rasterized.outputs[0][self._layer]
         return np.flatnonzero(np.asarray(face_id) >= 0)
 
@@ -195,7 +200,7 @@ class Samples:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
         the background's; of values [M, C] of the samples with a face, as interpolate(covered=True) has them, it is 0, and a
-        channel of ones becomes the image's alpha. Contours count that fewer surfaces hide than there are layers: whichever
+        channel of ones becomes alpha, which wants clamping. Contours count that fewer surfaces hide than there are layers: whichever
         layer's resolve() is called. Beside contours samples are continued, so that images may leave the values' range by a
         little. Raises ValueError for another shape, and what is not finite."""
         values = self._of_all(self._of_my_kind("values", values))
@@ -209,12 +214,12 @@ class Samples:
 
     def _of_all(self, values):
         """Values of all samples, 0 where nothing is, of those of the samples with a face."""
-        if values.ndim != 2:
-            return values
-        if len(values) != len(self._covered):
-            expected = f"[{len(self._covered)}, C], of the samples with a face"
-            _arrays.fail(ValueError, "values", list(values.shape), expected, "dpr.Samples")
         size = self.face_id.shape
+        if values.ndim == 4:
+            return values
+        if values.ndim != 2 or len(values) != len(self._covered) or values.shape[-1] == 0:
+            expected = f"{[*size, 'C']}, or [{len(self._covered)}, C] of the samples with a face".replace("'", "")
+            _arrays.fail(ValueError, "values", list(values.shape), expected, "dpr.Samples")
         return _arrays.spread(values, self._covered, int(np.prod(size))).reshape(*size, values.shape[-1])
 
     def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
@@ -260,11 +265,14 @@ class Samples:
         value_tangents [K, *values.shape], and by way of the contours, vertices, views and intrinsics by `tangents` as
         jvp() takes them; of both, those left out stay."""
         self._require_numpy("resolve_with_jvp()")
-        kept = self._of_all(_kept(values))
+        own = _kept(values)
+        kept = self._of_all(own)
         if value_tangents is not None:
             value_tangents = _kept(value_tangents, "tangents of values")
-            if value_tangents.ndim == 3:
-                value_tangents = np.stack([self._of_all(moved) for moved in value_tangents])
+            if value_tangents.shape[1:] != own.shape or len(value_tangents) == 0:
+                _arrays.fail(ValueError, "tangents of values", list(value_tangents.shape),
+                             f"[K, {', '.join(map(str, own.shape))}]", "dpr.Samples")
+            value_tangents = np.stack([self._of_all(moved) for moved in value_tangents])
         if value_tangents is None and tangents is None:
             _arrays.fail(ValueError, "tangents", "none", "those of the values, or of one array at least", "dpr.Samples")
         count, given = (len(value_tangents), {}) if tangents is None else self._moving(tangents)

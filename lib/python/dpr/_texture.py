@@ -184,7 +184,8 @@ def texture(tex: Tensor, uv: Tensor, uv_da: Optional[Tensor] = None, mip_level_b
     given = {"directions" if is_cube else "places": uv}
     if is_mipmap:
         given.update({name: array for name, array in (("steps", uv_da), ("levels", mip_level_bias)) if array is not None})
-    tensors = [array if array.detach().sum().isfinite() else torch.nan_to_num(array, 0.0, 0.0, 0.0) for array in given.values()]
+    tensors = [array if array.detach().sum().isfinite() else torch.nan_to_num(array, 0.0, 0.0, 0.0)
+               for array in given.values()]
     names = (*given, *(f"texels[{i}]" for i in range(len(levels))))
     lookup = Lookup(names, _BOUNDARIES[boundary_mode], _FILTERS[filter_mode])
     return read(lookup, [*tensors, *(level.flatten(0, -4) for level in levels)])

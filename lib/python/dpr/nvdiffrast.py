@@ -19,9 +19,8 @@ from typing import Any, List, Optional, Sequence, Tuple, Union
 
 import torch
 from torch import Tensor
-from torch.autograd.function import once_differentiable
 
-from . import _arrays, _rasterized
+from . import _arrays, _library, _rasterized, _torch
 from ._clip_frames import Frames
 from ._texture import Mip, check_floats, texture, texture_construct_mip
 
@@ -213,6 +212,12 @@ def _chosen(diff_attrs, channels):
     return [int(i) % channels for i in diff_attrs]
 
 
+def _plain(tensor):
+    """One that a backward pass may keep, which it may not of inference mode's."""
+    is_kept = not isinstance(tensor, Tensor) or not tensor.is_inference() or torch.is_inference_mode_enabled()
+    return tensor if is_kept else tensor.clone()
+
+
 class _Interpolate(torch.autograd.Function):
     """(names of the outputs, attributes [1 or N, V, A], rast, rast_db or None, tri) to the outputs."""
 
@@ -225,16 +230,30 @@ class _Interpolate(torch.autograd.Function):
     def forward(ctx, names, *tensors):
         ctx.names = names
         ctx.save_for_backward(*tensors)
-        found = _rasterized.interpolated_at(*_Interpolate._arrays(*tensors), names)
+        try:
+            found = _rasterized.interpolated_at(*_Interpolate._arrays(*tensors), names)
+        except _library.InvalidArgument as error:
+            error.args = (str(error).replace("attributes (interpolate)", "attr (dpr.nvdiffrast.interpolate)"),)
+            raise
         return tuple(map(torch.from_numpy, found.values()))
 
     @staticmethod
-    @once_differentiable
     def backward(ctx, *grads):
-        given = {name: _arrays.to_numpy(grad) for name, grad in zip(ctx.names, grads)}
-        found = _rasterized.interpolated_gradients_at(*_Interpolate._arrays(*ctx.saved_tensors), given)
-        names = zip(("attributes", "rast", "rast_db"), ctx.needs_input_grad[1:])
-        return None, *(torch.from_numpy(found[name]) if wanted else None for name, wanted in names), None
+        wanted = ctx.needs_input_grad[1:4]
+        return None, *_InterpolateGradients.apply(ctx.names, wanted, len(grads), *grads, *ctx.saved_tensors), None
+
+
+@_torch.one_forward
+class _InterpolateGradients(_torch.Derivative):
+    """(names of the outputs, which gradients are wanted, how many outputs, their gradients, what _Interpolate was given) to
+    gradients of the attributes, rast and rast_db."""
+
+    @staticmethod
+    def forward(names, wanted, count, *tensors):
+        grads = {name: _arrays.to_numpy(grad) for name, grad in zip(names, tensors)}
+        found = _rasterized.interpolated_gradients_at(*_Interpolate._arrays(*tensors[count:]), grads)
+        return tuple(torch.from_numpy(found[name]) if is_wanted else None
+                     for name, is_wanted in zip(("attributes", "rast", "rast_db"), wanted))
 
 
 def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tensor] = None,
@@ -243,7 +262,8 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
 
     Returns the attributes [N, H, W, A], 0 in empty pixels, and derivatives [N, H, W, 2 D] of the D attributes in
     diff_attrs, a list of indices or "all": dA/dX and dA/dY per pixel, in turn. diff_attrs needs rast_db. Gradients
-    reach attr, rast and rast_db."""
+    reach attr, rast and rast_db; those of empty pixels are ignored. Raises ValueError where attributes that are seen are
+    not finite."""
     check_floats("attr", attr, (2, 3), "[V, A] or [N, V, A]", "interpolate")
     _check_rast(rast, "interpolate")
     table = attr if attr.ndim == 3 else attr[None]
@@ -254,10 +274,13 @@ def interpolate(attr: Tensor, rast: Tensor, tri: Tensor, rast_db: Optional[Tenso
     numbers_of_rast = rast.detach()[..., 3]
     if bool((numbers_of_rast > len(tri)).any()):
         _fail("tri", list(tri.shape), f"the triangles of rast, at least {float(numbers_of_rast.max()):g}", "interpolate")
-    chosen = [] if diff_attrs is None or len(diff_attrs) == 0 else _chosen(diff_attrs, channels)
+    chosen = [] if diff_attrs is None else _chosen(diff_attrs, channels)
+    table, rast, rast_db = map(_plain, (table, rast, rast_db))
     if not chosen:
         values, = _Interpolate.apply(("values",), table, rast, None, tri)
         return values, rast.new_empty(*shape, 0)
+    if rast_db is not None:
+        check_floats("rast_db", rast_db, (4,), "[N, H, W, 4]", "interpolate")
     if rast_db is None or rast_db.shape != rast.shape:
         got = None if rast_db is None else list(rast_db.shape)
         _fail("rast_db", got, f"{list(rast.shape)} with diff_attrs", "interpolate")

@@ -102,7 +102,7 @@ def texture_at(texture: Tensor, texcoords: Tensor) -> Tensor:
 
 
 def _share(numbers):
-    """From 0 to 1; at both the gradient is as between them, where clamp() has none in some versions of PyTorch."""
+    """Clamped to [0, 1]. At both ends the gradient is that of the inside; clamp() of some versions of PyTorch has 0 there."""
     numbers = torch.where(numbers < 0, torch.zeros_like(numbers), numbers)
     return torch.where(numbers > 1, torch.ones_like(numbers), numbers)
 
