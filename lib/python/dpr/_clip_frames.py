@@ -63,7 +63,7 @@ class _Frame:
         else:
             covered = shown.reshape(-1).nonzero()[:, 0]
             of_pos, of_weights = self._gradients_at(pos, covered, grad_rast, grad_db)
-            inner += _rows.spread(of_weights, covered, rast[..., 0].numel()).reshape(inner.shape)
+            inner += _arrays.spread(of_weights, covered, rast[..., 0].numel()).reshape(inner.shape)
         found = self._rasterized.gradients_of_layer(raster.layers - 1, (None, grad, None))
         return of_pos, [torch.from_numpy(found[i]) if i in found else None for i in range(len(self._tensors))]
 

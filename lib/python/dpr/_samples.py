@@ -200,9 +200,9 @@ class Samples:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
         contours and blurred, as the library makes images of its own colours. Samples where nothing is need a value too:
         the background's; of values [M, C] of the samples with a face, as interpolate(covered=True) has them, it is 0, and a
-        channel of ones becomes alpha, which wants clamping. Contours count that fewer surfaces hide than there are layers: whichever
-        layer's resolve() is called. Beside contours samples are continued, so that images may leave the values' range by a
-        little. Raises ValueError for another shape, and what is not finite."""
+        channel of ones becomes alpha, which wants clamping. Contours count that fewer surfaces hide than there are layers:
+        whichever layer's resolve() is called. Beside contours samples are continued, so that images may leave the values'
+        range. Raises ValueError for another shape, and what is not finite."""
         values = self._of_all(self._of_my_kind("values", values))
         if self._is_of_jax:
             from . import _jax
