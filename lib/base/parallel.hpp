@@ -26,6 +26,16 @@ void in_parallel(std::size_t count, const Function& function,
   for (std::future<void>& other : others) other.get();
 }
 
+/// The same one by one: `function(i)`.
+template <class Function>
+void for_each_in_parallel(std::size_t count, const Function& function,
+                          std::size_t least_of_thread = k_least_of_thread) {
+  const auto in_turn = [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) function(i);
+  };
+  in_parallel(count, in_turn, least_of_thread);
+}
+
 /// Calls `function()`, which does so many things: on a thread of its own, or when the result is waited for.
 template <class Function>
 std::future<void> aside(std::size_t count, const Function& function) {

@@ -120,13 +120,7 @@ void Batch::clip_space_rast(NamedArrays arrays, NamedArrays outputs) {
       steps = triangle->steps(weights, pixel);
     }
   };
-  constexpr std::size_t k_least_pixels = 1U << 14U;
-  in_parallel(
-      views * height,
-      [&](std::size_t first, std::size_t last) {
-        for (std::size_t row = first; row < last; ++row) fill_row(row);
-      },
-      std::max<std::size_t>(k_least_pixels / width, 1));
+  for_each_in_parallel(views * height, fill_row, std::max<std::size_t>(k_least_of_thread / width, 1));
 }
 
 }  // namespace dpr::batch

@@ -107,9 +107,7 @@ class InterpolateCall {
 
   template <class From, class To, class Convert>
   static void give(std::span<const From> from, std::span<To> to, const Convert& convert) {
-    in_parallel(from.size(), [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) to[i] = convert(from[i]);
-    });
+    for_each_in_parallel(from.size(), [&](std::size_t i) { to[i] = convert(from[i]); });
   }
 
   bool is_rast_;  // samples are as nvdiffrast has them

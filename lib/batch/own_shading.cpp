@@ -1,5 +1,7 @@
 // Shading of the caller's own around a batch: samples out, values in, images out, and the gradients of both.
 #include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -82,9 +84,7 @@ void Batch::read_samples(NamedArrays samples) {
   const MappedRead places(m.surface_samples->places);
   const auto fill = [&]<class Value>(const NamedArray& array, Value&& value) {
     const std::span out(static_cast<std::decay_t<decltype(value(0))>*>(array.data), faces.size());
-    in_parallel(out.size(), [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) out[i] = value(i);
-    });
+    for_each_in_parallel(out.size(), [&](std::size_t i) { out[i] = value(i); });
   };
   for (const NamedArray& array : samples) {
     if (array.name == "face_id")
@@ -128,21 +128,24 @@ void Batch::samples_backward(NamedArrays grads, NamedArrays gradients) {
     const std::size_t numbers = grad.name == "depth" ? count : k_corners * count;
     if (grad.element != Element::float32 || grad.count() != numbers)
       throw InvalidArgument(argument(grad), text_of(grad.shape), std::to_string(numbers) + " floats");
-    checks::require_numbers({static_cast<const float*>(grad.data), numbers}, numbers, "grad_" + grad.name);
     if (grad.name == "depth") {
       depths = grad.rows<const float>();
+      checks::require_numbers(depths, count, "grad_depths");
     } else {
       barycentrics = grad.rows<const glm::vec3>();
     }
   }
   renderer.set_gradients(request_of(wanted_, true));
   SceneGradient found = impl_of(renderer).samples_backward([&](std::span<cl_float4> places) {
-    in_parallel(count, [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) {
-        const glm::vec3 g = barycentrics.empty() ? glm::vec3(0) : barycentrics[i];
-        places[i] = {{g.y - g.x, g.z - g.x, depths.empty() ? 0 : depths[i], 0}};
-      }
+    std::atomic<float> wrong = 0;  // of the differences, which finite numbers may not have
+    for_each_in_parallel(count, [&](std::size_t i) {
+      const glm::vec3 g = barycentrics.empty() ? glm::vec3(0) : barycentrics[i];
+      const float first = g.y - g.x, second = g.z - g.x;
+      for (const float number : {first, second})
+        if (!std::isfinite(number)) wrong = number;
+      places[i] = {{first, second, depths.empty() ? 0 : depths[i], 0}};
     });
+    if (wrong != 0) throw InvalidArgument("grad_barycentrics", checks::text(wrong.load()), "finite numbers");
   });
   add_gradients(found, true, gradients);
 }

@@ -86,11 +86,9 @@ class Table {
  private:
   void require_faces(std::size_t faces) const {
     std::atomic<std::int64_t> wrong = -1;
-    in_parallel(count(), [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) {
-        const std::int64_t face = samples_.face(i);
-        if (face < -1 || face >= static_cast<std::int64_t>(faces)) wrong = static_cast<std::int64_t>(i);
-      }
+    for_each_in_parallel(count(), [&](std::size_t i) {
+      const std::int64_t face = samples_.face(i);
+      if (face < -1 || face >= static_cast<std::int64_t>(faces)) wrong = static_cast<std::int64_t>(i);
     });
     if (wrong < 0) return;
     const std::int64_t face = samples_.face(static_cast<std::size_t>(wrong.load()));
@@ -126,6 +124,23 @@ float mixed(std::span<const float> values, const std::array<std::size_t, 3>& cor
          weights[2] * values[corners[2] + channel];
 }
 
+/// Writes what `write(sample, corners, numbers)` finds to the numbers of each sample with a face, and 0 to the others'.
+template <class Write>
+void fill(const Table& table, std::size_t of_sample, std::span<float> out, const char* name,
+          const Write& write) {
+  if (out.size() != table.count() * of_sample)
+    throw InvalidArgument(checks::in(name, "interpolate"), std::to_string(out.size()),
+                          std::to_string(table.count() * of_sample));
+  for_each_in_parallel(table.count(), [&](std::size_t i) {
+    const std::span<float> to = out.subspan(i * of_sample, of_sample);
+    if (table.is_empty(i)) {
+      std::ranges::fill(to, 0.0F);
+    } else {
+      write(i, table.corners(i), to);
+    }
+  });
+}
+
 }  // namespace
 
 SampleArrays::SampleArrays(const Samples& samples)
@@ -150,22 +165,11 @@ std::vector<float> interpolate(const Samples& samples, const Attributes& attribu
 
 void interpolate(const SampleArrays& samples, const Attributes& attributes, std::span<float> values) {
   const Table table(samples, attributes);
-  const std::size_t channels = table.channels();
-  if (values.size() != table.count() * channels)
-    throw InvalidArgument("values (interpolate)", std::to_string(values.size()),
-                          std::to_string(table.count() * channels));
-  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const std::span<float> to = values.subspan(i * channels, channels);
-      if (table.is_empty(i)) {
-        std::ranges::fill(to, 0.0F);
-        continue;
-      }
-      const auto corners = table.corners(i);
-      const auto weights = weights_of(samples.place(i));
-      for (std::size_t c = 0; c < channels; ++c) to[c] = mixed(attributes.values, corners, c, weights);
-    }
-  });
+  fill(table, table.channels(), values, "values",
+       [&](std::size_t i, const auto& corners, std::span<float> to) {
+         const auto weights = weights_of(samples.place(i));
+         for (std::size_t c = 0; c < to.size(); ++c) to[c] = mixed(attributes.values, corners, c, weights);
+       });
 }
 
 std::vector<float> interpolate_steps(const Samples& samples, const Attributes& attributes) {
@@ -177,26 +181,15 @@ std::vector<float> interpolate_steps(const Samples& samples, const Attributes& a
 void interpolate_steps(const SampleArrays& samples, const Attributes& attributes, std::span<float> steps) {
   const Table table(samples, attributes);
   table.require_steps();
-  const std::size_t channels = table.channels();
-  if (steps.size() != 2 * table.count() * channels)
-    throw InvalidArgument("steps (interpolate)", std::to_string(steps.size()),
-                          std::to_string(2 * table.count() * channels));
-  in_parallel(table.count(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      const std::span<float> to = steps.subspan(2 * i * channels, 2 * channels);
-      if (table.is_empty(i)) {
-        std::ranges::fill(to, 0.0F);
-        continue;
-      }
-      const auto corners = table.corners(i);
-      const vec4 step = samples.step(i);
-      const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
-      for (std::size_t c = 0; c < channels; ++c) {
-        to[2 * c] = mixed(attributes.values, corners, c, right);
-        to[2 * c + 1] = mixed(attributes.values, corners, c, down);
-      }
-    }
-  });
+  fill(table, 2 * table.channels(), steps, "steps",
+       [&](std::size_t i, const auto& corners, std::span<float> to) {
+         const vec4 step = samples.step(i);
+         const auto right = changes_of(step.x, step.z), down = changes_of(step.y, step.w);
+         for (std::size_t c = 0; c < table.channels(); ++c) {
+           to[2 * c] = mixed(attributes.values, corners, c, right);
+           to[2 * c + 1] = mixed(attributes.values, corners, c, down);
+         }
+       });
 }
 
 namespace {
@@ -309,13 +302,9 @@ InterpolateGradient interpolate_backward(const SampleArrays& samples, const Attr
       if (!grad_steps.empty()) run.add_steps(grad_steps, i, last, values, found.steps);
     }
   };
-  const auto add = [&](std::size_t first_part, std::size_t last_part) {
-    for (std::size_t part = first_part; part < last_part; ++part) add_part(part);
-  };
-  in_parallel(parts, add, 1);
-  in_parallel(numbers, [&](std::size_t first, std::size_t last) {
-    for (std::size_t part = 0; part + 1 < parts; ++part)
-      for (std::size_t i = first; i < last; ++i) found.values[i] += others[part * numbers + i];
+  for_each_in_parallel(parts, add_part, 1);
+  for_each_in_parallel(numbers, [&](std::size_t i) {
+    for (std::size_t part = 0; part + 1 < parts; ++part) found.values[i] += others[part * numbers + i];
   });
   return found;
 }

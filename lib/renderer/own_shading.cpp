@@ -248,13 +248,11 @@ Samples Renderer::samples(bool with_steps) {
     found.faces.resize(faces.size());
     found.barycentrics.resize(faces.size());
     found.depths.resize(faces.size());
-    in_parallel(faces.size(), [&](std::size_t first, std::size_t last) {
-      for (std::size_t i = first; i < last; ++i) {
-        const cl_float4& place = places[i];
-        found.faces[i] = faces[i] == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(faces[i]);
-        found.barycentrics[i] = {place.s[0], place.s[1]};
-        found.depths[i] = place.s[2];
-      }
+    for_each_in_parallel(faces.size(), [&](std::size_t i) {
+      const cl_float4& place = places[i];
+      found.faces[i] = faces[i] == DPR_NO_FACE ? -1 : static_cast<std::int32_t>(faces[i]);
+      found.barycentrics[i] = {place.s[0], place.s[1]};
+      found.depths[i] = place.s[2];
     });
   }
   if (with_steps) {

@@ -251,6 +251,12 @@ class OwnShadingTest(unittest.TestCase):
             with self.subTest(words), self.assertRaisesRegex(ValueError, words):
                 samples.interpolate(*given)
 
+    def test_gradients_too_large_for_their_differences(self):
+        samples = RENDERER.rasterize(*self.arguments())
+        for numbers in ([3e38, -3e38, 0], [0, 0, np.nan]):
+            with self.assertRaisesRegex(ValueError, "grad_barycentrics.*finite numbers"):
+                samples.pullback(barycentrics=np.broadcast_to(np.float32(numbers), samples.barycentrics.shape))
+
     def test_covered_samples_alone(self):
         """The same numbers as of all samples: shared tables, those of views, faces of views, lists, layers."""
         square = np.concatenate([0.9 * SQUARE[:3], SQUARE[:1]])
