@@ -60,8 +60,8 @@ kernel void antialias_front(const FrameParams p, const uint layers, global const
 
 /// True if a contour goes before the one that a step has.
 static inline int goes_before(uint before, float before_depth, uint contour, float depth) {
-  const uint is_crease = contour & DPR_CONTOUR_CREASE, before_is_crease = before & DPR_CONTOUR_CREASE;
-  return is_crease < before_is_crease || (is_crease == before_is_crease && depth < before_depth);
+  const int creases = is_crease(contour), before_creases = is_crease(before);
+  return creases < before_creases || (creases == before_creases && depth < before_depth);
 }
 
 /// The depth at which a contour crosses a line. Found again where another contests its step: a place for each
@@ -121,6 +121,7 @@ kernel void antialias_cross(const FrameParams p, global const ViewParams* restri
   ulong several_right = 0, several_down = 0;  // steps, a bit each
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
+    if (is_left_out(p, contour)) continue;
     const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
     for (int by_rows = 0; by_rows < 2; ++by_rows) {
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
@@ -138,7 +139,7 @@ kernel void antialias_cross(const FrameParams p, global const ViewParams* restri
           loses = !goes_before(before, depth_on_line(p, other, by_rows, line), contour, depth);
         }
         if (loses && ((by_rows ? several_right : several_down) & bit)) continue;
-        const int hidden = hidden_from(p, v, c, e, x, (int)(contour & DPR_CONTOUR_CREASE), depth);
+        const int hidden = hidden_from(p, v, c, e, x, is_crease(contour), depth);
         if (hidden == 2) continue;
         if (before != DPR_NO_CROSSING) {
           several_right |= by_rows ? bit : 0;

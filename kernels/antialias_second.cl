@@ -35,7 +35,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
   const RasterEdge of_winner = raster_edge(winner.a, winner.b, e.is_by_rows);
   const int is_first = x.position < position_on_line(p, of_winner, x.line),
             inner_first = first_is_inner(c, e);
-  if (c.flags & DPR_CONTOUR_CREASE) {
+  if (is_crease(c.flags)) {
     const int column = x.column + (e.is_by_rows && !is_first), row = x.row + (!e.is_by_rows && !is_first);
     const float front = v.front[v.first + (uint)row * p.width + (uint)column],
                 slack = v.reach + DPR_DEPTH_SLACK * depth;
@@ -44,7 +44,7 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
   }
   if (inner_first != is_first && hidden_from(p, v, c, e, x, 0, depth)) return 1;
   // The surface that the winner bounds hides all behind it; contours that meet lie on one surface.
-  return !(winner.flags & DPR_CONTOUR_CREASE) && is_first == first_is_inner(winner, of_winner) &&
+  return !is_crease(winner.flags) && is_first == first_is_inner(winner, of_winner) &&
          mix_depths(p, winner.depths, along_edge(p, of_winner, x.line)) <
              depth * (1.0f - DPR_DEPTH_SLACK) - v.reach &&
          !have_end_in_common(winner, c);
@@ -93,6 +93,7 @@ kernel void antialias_second_find(const FrameParams p, global const ViewParams* 
   uint count = 0;
   for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
     const uint contour = pair_contour[pair];
+    if (is_left_out(p, contour)) continue;
     const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
     uint found = count;
 #pragma unroll 1

@@ -8,108 +8,10 @@
 //
 // Edges end at the plane that faces cross, the near one or the far one, and the plane's cut of a face is a
 // boundary: the cuts of all faces are numbered behind the edges of the scene.
-#include "contour.h"
-#include "face_normal.h"
+#include "contour_kind.h"
 
 /// Most that rounding moves a crossing, in samples.
 #define DPR_CROSSING_SLACK 0.01f
-
-/// The sine of the angle between faces from which they count as shaded differently.
-#define DPR_LEAST_CREASE 1e-4f
-
-/// Everything that says what an edge is; of one view.
-typedef struct {
-  global const uchar* facing;        // [face]
-  global const float4 *ndc, *world;  // [vertex]
-  global const uint4 *faces, *face_colors;
-  global const float4* colors;
-  EdgeScene edges;
-} ContourScene;
-
-/// Number of the face's corner that a vertex is, or coincides with; 3 where none does.
-static inline uint corner_at(uint4 face, uint vertex, global const float4* ndc) {
-  const float4 v = ndc[vertex];
-  return is_same(ndc[face.x], v) ? 0 : is_same(ndc[face.y], v) ? 1 : is_same(ndc[face.z], v) ? 2 : 3;
-}
-
-/// True if the faces' colours differ at an end of the edge.
-DPR_ALWAYS_INLINE int color_jumps(const ContourScene s, uint4 edge) {
-  const uint own = own_face(edge), other = other_face(edge);
-#pragma unroll 1
-  for (int end = 0; end < 2; ++end) {
-    const uint vertex = end == 0 ? edge.x : edge.y;
-    const uint in_own = corner_at(s.faces[own], vertex, s.ndc),
-               in_other = corner_at(s.faces[other], vertex, s.ndc);
-    if (!is_same(s.colors[corner_in(s.face_colors + own, in_own)],
-                 s.colors[corner_in(s.face_colors + other, in_other)]))
-      return 1;
-  }
-  return 0;
-}
-
-static inline int normals_differ(const ContourScene s, uint4 edge) {
-  const float3 n0 = face_normal(s.world, s.faces[own_face(edge)]);
-  const float3 n1 = face_normal(s.world, s.faces[other_face(edge)]);
-  const float3 c = cross(n0, n1);
-  return dot(c, c) > DPR_LEAST_CREASE * DPR_LEAST_CREASE * dot(n0, n0) * dot(n1, n1);
-}
-
-/// True if an edge on vertices of its own face alone is the one that stands for both: the one whose face is
-/// in front.
-static inline int stands_for_both(uint4 edge, global const uchar* facing) {
-  const uint own = facing[own_face(edge)], other = facing[other_face(edge)];
-  const int own_rank = own == DPR_FACE_DROPPED ? 0 : own == DPR_FACE_BACK ? 1 : 2;
-  const int other_rank = other == DPR_FACE_DROPPED ? 0 : other == DPR_FACE_BACK ? 1 : 2;
-  return own_rank > other_rank || (own_rank == other_rank && own_face(edge) < other_face(edge));
-}
-
-/// True if an edge lies within a surface, where nothing can jump: most do, and none of their ends is read.
-static inline int is_within_surface(const ContourScene s, uint edge, uint shading) {
-  if (edge >= s.edges.mesh_edges || shading == DPR_FLAT) return 0;
-  const uint2 sides_of = s.edges.edges[edge];
-  if ((sides_of.x & (DPR_EDGE_FLAG | DPR_EDGE_SEAM)) || sides_of.y == DPR_NO_FACE ||
-      (sides_of.y & DPR_EDGE_SEAM))
-    return 0;
-  const EdgeSides sides = edge_sides((uint4)(0, 0, sides_of.x / 3, sides_of.y), s.facing);
-  return sides.own == -sides.other;
-}
-
-static inline int contour_kind(const ContourScene s, const ViewEdge e, uint shading) {
-  const uint4 edge = e.record;
-  if (!e.is_there) return DPR_NO_CONTOUR;
-  EdgeSides sides = edge_sides(edge, s.facing);
-  if (!has_other_face(edge)) return sides.own != 0 ? DPR_OCCLUDES : DPR_NO_CONTOUR;
-  int is_split = 0;
-  if (edge.z & DPR_EDGE_FLAG) {
-    const uint4 other = s.faces[other_face(edge)];
-    is_split = !(other.x == edge.x || other.y == edge.x || other.z == edge.x) ||
-               !(other.x == edge.y || other.y == edge.y || other.z == edge.y);
-    if (is_split && !stands_for_both(edge, s.facing)) return DPR_NO_CONTOUR;
-  }
-  if (sides.own != -sides.other) return DPR_OCCLUDES;
-  if (sides.own == 0) return DPR_NO_CONTOUR;
-  if (edge.z & DPR_EDGE_SEAM) return DPR_CREASE;
-  if (shading != DPR_UNLIT && (edge.w & DPR_EDGE_SEAM)) return DPR_CREASE;
-  if (shading == DPR_FLAT && normals_differ(s, edge)) return DPR_CREASE;
-  if (!(edge.z & DPR_EDGE_FLAG)) return DPR_NO_CONTOUR;
-  if (is_split && shading != DPR_UNLIT && shading != DPR_FLAT) return DPR_CREASE;
-  return color_jumps(s, edge) ? DPR_CREASE : DPR_NO_CONTOUR;
-}
-
-static inline ContourScene scene_of_view(const FrameParams p, uint view, global const uint2* edges,
-                                         global const uchar* facing, global const float4* ndc,
-                                         global const float4* world, global const uint4* faces,
-                                         global const ClippedFace* clipped, global const float4* colors) {
-  ContourScene s;
-  s.facing = facing + view * p.faces;
-  s.ndc = ndc + view * p.vertices;
-  s.world = world + view * p.vertices;
-  s.faces = faces + first_row(p, view);
-  s.face_colors = s.faces + p.color_faces;
-  s.colors = colors + view * p.color_stride;
-  s.edges = edges_of_view(p, view, edges, faces, ndc, clipped);
-  return s;
-}
 
 /// An edge over tiles.
 typedef struct {
@@ -143,17 +45,20 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 /// in   faces        uint4[...][face]      vertices and, from p.color_faces on, colours of the corners
 /// in   clipped      ClippedFace[view][face]  read where p.clips is set
 /// in   colors       float4[color] or, with a stride, float4[view][color]
+/// in   normal_faces, normals  uint4[face], float4[normal]  read where p.shading is DPR_BESIDE_NORMALS
 /// out  counts       uint[view][edge]
-/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, DPR_CONTOUR_LEFT. Not written of others
+/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, _ONE, _LEFT. Not written of others
 kernel void contour_count(const FrameParams p, global const uint2* restrict edges,
                           global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
                           global const ClippedFace* restrict clipped, global const float4* restrict colors,
+                          global const uint4* restrict normal_faces, global const float4* restrict normals,
                           global uint* restrict counts, global uchar* restrict kinds) {
   const uint i = (uint)get_global_id(0);
   if (i >= p.views * p.edges) return;
   const uint view = i / p.edges;
-  const ContourScene s = scene_of_view(p, view, edges, facing, ndc, world, faces, clipped, colors);
+  const ContourScene s =
+      scene_of_view(p, view, edges, facing, ndc, world, faces, clipped, colors, normal_faces, normals);
   counts[i] = 0;
   if (is_within_surface(s, i - view * p.edges, p.shading)) return;
   const ViewEdge edge = view_edge(s.edges, i - view * p.edges);
@@ -161,7 +66,11 @@ kernel void contour_count(const FrameParams p, global const uint2* restrict edge
   const int kind = contour_kind(s, edge, p.shading);
   if (kind != DPR_NO_CONTOUR) {
     const int is_left = inner_side(edge_sides(edge.record, s.facing)) > 0;
-    kinds[i] = (uchar)((kind == DPR_CREASE ? DPR_CONTOUR_CREASE : 0) | (is_left ? DPR_CONTOUR_LEFT : 0));
+    const uint crease = kind == DPR_CREASE              ? DPR_CONTOUR_CREASE
+                        : kind == DPR_CREASE_OF_COLORS  ? DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE
+                        : kind == DPR_CREASE_OF_NORMALS ? DPR_CONTOUR_ONE
+                                                        : 0;
+    kinds[i] = (uchar)(crease | (is_left ? DPR_CONTOUR_LEFT : 0));
     const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
     for (uint row = t.rows.x; row <= t.rows.y; ++row) {
       for (uint column = t.columns.x; column <= t.columns.y; ++column)

@@ -11,6 +11,19 @@
 #define DPR_NO_CONTOUR 0
 #define DPR_OCCLUDES 1
 #define DPR_CREASE 2
+/// Creases in frames that show normals beside colours, where one of the two jumps and the other does not.
+#define DPR_CREASE_OF_COLORS 3
+#define DPR_CREASE_OF_NORMALS 4
+
+/// Of a contour's number.
+static inline int is_crease(uint contour) { return (contour & (DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE)) != 0; }
+
+/// True of a contour at which colours jump while crossings are found for normals, or the reverse.
+static inline int is_left_out(const FrameParams p, uint contour) {
+  const uint crease = contour & (DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE);
+  return (p.shading == DPR_BESIDE_NORMALS && crease == DPR_CONTOUR_ONE) ||
+         (p.shading == DPR_NORMALS && crease == (DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE));
+}
 
 /// On which sides of an edge its faces lie: +1 to the left of first -> second end, -1 to the right, 0 where
 /// there is none, or a dropped one.

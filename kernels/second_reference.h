@@ -90,7 +90,7 @@ static inline uint reference_of(const FrameParams p, uint view, uint contour, co
   const int is_inner = first_is_inner(c, e), across = e.is_by_rows ? x.column : x.row;
 #pragma unroll 1
   for (int away = 1; away <= DPR_REFERENCE_LINES; ++away) {
-    if (away == DPR_NEAR_LINES && c.flags & DPR_CONTOUR_CREASE) {
+    if (away == DPR_NEAR_LINES && is_crease(c.flags)) {
       const uint own = view * p.faces + own_face(c.record), other = view * p.faces + other_face(c.record);
       const uint samples =
           find_samples(p, view, is_inner ? own : other, is_inner ? other : own, e, x, front_face);

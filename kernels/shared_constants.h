@@ -75,6 +75,11 @@
 #define DPR_BLINN 4
 #define DPR_MICROFACET 5
 
+/// In their place, in frames that show normals beside unlit colours: while contours are found, and crossings for the
+/// colours; and while they are found for the normals.
+#define DPR_BESIDE_NORMALS 6
+#define DPR_NORMALS 7
+
 /// Kinds of lights beyond points that kernels are built for: bits of DPR_LIGHTS.
 #define DPR_LIGHTS_DISTANT 1   /* infinitely far away: position.w is 0 */
 #define DPR_LIGHTS_CONES 2     /* within a cone about an axis */
@@ -183,12 +188,14 @@
 
 /// A contour's number is DPR_CONTOUR_FLAGS * (view * edges + edge), and: whether it is a crease; which of its
 /// ends have corners that count (CornerArea in crossing.h); whether the surface that it bounds, or its own
-/// face of a crease, lies to the left of first -> second end.
+/// face of a crease, lies to the left of first -> second end. DPR_CONTOUR_ONE, where normals are beside colours, is set
+/// of a crease of colours alone; and, without DPR_CONTOUR_CREASE, of one of normals alone.
 #define DPR_CONTOUR_CREASE 1u
 #define DPR_CONTOUR_FIRST_END 2u
 #define DPR_CONTOUR_SECOND_END 4u
 #define DPR_CONTOUR_LEFT 8u
-#define DPR_CONTOUR_FLAGS 16u
+#define DPR_CONTOUR_ONE 16u
+#define DPR_CONTOUR_FLAGS 32u
 
 /// The contour of a step between samples that none crosses.
 #define DPR_NO_CROSSING 0xffffffffu

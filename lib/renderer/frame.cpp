@@ -18,7 +18,23 @@ const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const Scene
   Renderer::Impl& r = impl_of(renderer);
   r.require_forward(caller);
   r.tangent(directions);
-  return r.tangents.images;
+  return r.tangents.shown.images;
+}
+
+void show_normals(Renderer& renderer) {
+  Renderer::Impl& r = impl_of(renderer);
+  r.shown_normals.emplace(impl_of(r.device), r.scene);
+  r.rendered = false;
+}
+
+const Buffer<cl_float4>& last_normals(const Renderer& renderer, const char* caller) {
+  Renderer::Impl& r = impl_of(renderer);
+  r.require_forward(caller);
+  return r.pixel_noise ? r.shown_normals->smoothed : r.shown_normals->raster;
+}
+
+const Buffer<cl_float4>& last_normal_tangents(const Renderer& renderer) {
+  return impl_of(renderer).shown_normals->tangents.images;
 }
 
 void show_depths(Renderer& renderer) {

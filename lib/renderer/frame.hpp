@@ -37,6 +37,15 @@ Frame last_frame(const Renderer& renderer, const char* caller);
 const Buffer<cl_float4>& last_tangents(Renderer& renderer, std::span<const SceneTangent> directions,
                                        const char* caller);
 
+/// Makes the renderer's frames show the normals that its scene's meshes give too, in an image of their own: in object
+/// space, interpolated and composed as colours are, over 0. Until the next scene; nothing of it has gradients, and
+/// frames are not cut into bands of samples.
+void show_normals(Renderer& renderer);
+/// [view][height][width] normals and alpha of the last frame. Throws as last_frame().
+const Buffer<cl_float4>& last_normals(const Renderer& renderer, const char* caller);
+/// Their tangents, of the last call of last_tangents().
+const Buffer<cl_float4>& last_normal_tangents(const Renderer& renderer);
+
 /// Makes the renderer's next frame, in the scene and the views that it has now, show depths along the view direction in
 /// all three channels in place of colours: vertices need colours of their own. Tangents and gradients follow.
 void show_depths(Renderer& renderer);

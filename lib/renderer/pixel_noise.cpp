@@ -91,9 +91,7 @@ void PixelNoise::prepare(const ContourInputs& in, const Blur::Size& size,
   if (sampled) sampled->draw(size, in.p.first_view);
 }
 
-void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-                         const Buffer<cl_uint>& tile_starts) {
-  prepare(in, size, tile_starts);
+void PixelNoise::forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size) {
   antialias.forward(in.p, contour, raster, kept_);
   is_blended_ = true;
   blur_forward(size, raster, image, false);
@@ -145,9 +143,7 @@ Blur::Size along_all(Blur::Size size, const Tangents& tangents) {
 void PixelNoise::smooth_tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
                                 Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels,
                                 Buffer<float>& scratch) {
-  antialias.tangent(in, contour, other_kept_, tangents, samples, {kept_grad_, scratch});
-  blur_forward(along_all(size, tangents), samples, pixels, true);
-  blur_holds_image_ = false;
+  tangent(in, {antialias, other_kept_, true}, size, tangents, samples, pixels, scratch);
 }
 
 void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
@@ -172,22 +168,23 @@ void PixelNoise::backward(const ContourInputs& in, Buffer<cl_float4>& raster, co
   antialias.backward(in, contour, kept_, grad_raster, {kept_grad_, scratch});
 }
 
-void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents,
+void PixelNoise::tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
+                         Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels, Buffer<float>& scratch) {
+  tangent(in, {antialias, kept_, false}, size, tangents, samples, pixels, scratch);
+}
+
+void PixelNoise::tangent(const ContourInputs& in, const Blended& of, const Blur::Size& size,
+                         const Tangents& tangents, Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels,
                          Buffer<float>& scratch) {
-  antialias.tangent(in, contour, kept_, tangents, tangents.rasters, {kept_grad_, scratch});
-  const Blur::Size all = along_all(size, tangents);
-  const std::size_t view_pixels = size.views * size.width * size.height;
-  const bool are_all = tangents.images.size() == tangents.params.directions * view_pixels;
-  Buffer<cl_float4>& moved = are_all ? tangents.images : moved_image_;
-  blur_forward(all, tangents.rasters, moved, false);
-  if (!are_all) moved.copy_to(tangents.images, tangents.first * view_pixels);
+  of.antialias.tangent(in, contour, of.kept, tangents, samples, {kept_grad_, scratch});
+  blur_forward(along_all(size, tangents), samples, pixels, of.is_whole);
   blur_holds_image_ = false;
 }
 
 std::size_t PixelNoise::bytes() const {
   return contour.bytes() + antialias.bytes() + blur.bytes() + (sampled ? sampled->bytes() : 0) +
          (edges ? edges->bytes() : 0) + image.capacity_bytes() + kept_.bytes() + other_kept_.bytes() +
-         grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes() + moved_image_.capacity_bytes();
+         grad_raster_.capacity_bytes() + kept_grad_.capacity_bytes();
 }
 
 void Renderer::Impl::find_edges() {

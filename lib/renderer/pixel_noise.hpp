@@ -28,6 +28,13 @@ PixelScale pixel_scale(const Smoothing& smoothing, int short_side);
 /// Distance behind the nearest surface, in normalised depth, up to which depth noise lets another be seen.
 float depth_reach(const Smoothing& smoothing);
 
+/// How samples were blended across contours. `is_whole`: they may differ outside of the covered part, too.
+struct Blended {
+  Antialias& antialias;
+  const KeptSamples& kept;
+  bool is_whole;
+};
+
 class PixelNoise {
  public:
   explicit PixelNoise(Device::Impl& device);
@@ -39,14 +46,13 @@ class PixelNoise {
   std::optional<Edges> edges;            // of the scene; made for its first frame
   BackFaces back_faces;                  // of the edges' meshes
 
-  /// What forward() does before it blends: all that smooth() needs.
+  /// Before forward(), smooth() and blur_forward(), after the antialiasing's find_front() of all bands. `tile_starts` are
+  /// the runs of the frame's pairs.
   void prepare(const ContourInputs& in, const Blur::Size& size, const Buffer<cl_uint>& tile_starts);
-  /// From samples, which are blended in place, to the image; after the antialiasing's find_front() of all
-  /// bands. `tile_starts` are the runs of the frame's pairs.
-  void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size,
-               const Buffer<cl_uint>& tile_starts);
-  /// forward() of a frame in bands of samples: at first; of each, in order, whose samples the raster holds, with
-  /// those around it (Antialias::k_rows_around); at last. `rows` are the band's, of tiles.
+  /// From samples, which are blended in place, to the image.
+  void forward(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size);
+  /// prepare() and forward() of a frame in bands of samples: at first; of each, in order, whose samples the raster
+  /// holds, with those around it (Antialias::k_rows_around); at last. `rows` are the band's, of tiles.
   void start(const ContourInputs& in, const Buffer<cl_uint>& tile_starts);
   void add(const ContourInputs& in, Buffer<cl_float4>& raster, const Blur::Size& size, const Range& rows);
   void finish(const Blur::Size& size);
@@ -89,9 +95,18 @@ class PixelNoise {
   void smooth_tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
                       Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels, Buffer<float>& scratch);
 
-  /// From the tangents of the samples, `tangents.rasters`, which are blended in place, to those of the image, along
-  /// a group's directions.
-  void tangent(const ContourInputs& in, const Blur::Size& size, Tangents& tangents, Buffer<float>& scratch);
+  /// The same of the samples that forward() took.
+  void tangent(const ContourInputs& in, const Blur::Size& size, const Tangents& tangents,
+               Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels, Buffer<float>& scratch);
+
+  /// The same of samples that others have blended.
+  void tangent(const ContourInputs& in, const Blended& of, const Blur::Size& size, const Tangents& tangents,
+               Buffer<cl_float4>& samples, Buffer<cl_float4>& pixels, Buffer<float>& scratch);
+
+  /// From samples whose contours are blended to [view][height][width]. `is_whole`: see Blended.
+  void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels,
+                    bool is_whole);
+
   /// Memory of so many elements, or of as many as there are samples, until backward() writes to it.
   Buffer<cl_float4>& room(const shared::FrameParams& p, std::size_t count) {
     kept_grad_.resize(device_, std::max(pixels_of(p), count));
@@ -109,14 +124,9 @@ class PixelNoise {
   std::size_t bytes() const;
 
  private:
-  /// `is_whole`: the samples may differ outside of the covered part, too.
-  void blur_forward(const Blur::Size& size, const Buffer<cl_float4>& blended, Buffer<cl_float4>& pixels,
-                    bool is_whole);
-
   KeptSamples kept_, other_kept_;
   Buffer<cl_float4> grad_raster_;  // where it has not taken the raster's place
   Buffer<cl_float4> kept_grad_;    // of a whole frame's samples; see room()
-  Buffer<cl_float4> moved_image_;  // tangents along a group's directions, where there are several groups
   bool is_blended_ = false;        // the raster is
   bool raster_is_gradient_ = false;
   bool blur_holds_image_ = false;  // what it keeps for the scale's gradient is of the image

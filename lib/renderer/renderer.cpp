@@ -94,6 +94,7 @@ void Renderer::Impl::set_up() {
   if (pixel_noise) {
     set_edges(frame, *pixel_noise->edges, scene.lights ? std::optional(scene.lights->shading) : std::nullopt,
               depth_reach(scene.smoothing));
+    if (shown_normals) frame.shading = DPR_BESIDE_NORMALS;
   }
   rasterize.clip = frame.clips != 0 ? &clip : nullptr;
   rasterize.hiding.reset();
@@ -128,7 +129,16 @@ FrameCounts Renderer::Impl::likely_counts(const FrameCounts& room) const {
 }
 
 ContourInputs Renderer::Impl::contour_inputs() const {
-  return {frame, device_views, *geometry, *pixel_noise->edges, transform, setup.facing, clip.faces};
+  const bool shows_normals = shown_normals.has_value();
+  return {frame,
+          device_views,
+          *geometry,
+          *pixel_noise->edges,
+          transform,
+          setup.facing,
+          clip.faces,
+          shows_normals ? shown_normals->faces : geometry->face_vertices,
+          shows_normals ? shown_normals->values : geometry->color_values};
 }
 
 Blur::Size Renderer::Impl::image_size() const {
@@ -149,11 +159,9 @@ void Renderer::Impl::find_contours(const std::optional<FrameCounts>& expected) {
 /// From samples to pixels, once all bands are rendered.
 void Renderer::Impl::finish_image() {
   if (!pixel_noise) return;
-  if (defers_image()) {
-    pixel_noise->prepare(contour_inputs(), image_size(), bin.tile_starts);
-  } else {
-    pixel_noise->forward(contour_inputs(), aggregate.image, image_size(), bin.tile_starts);
-  }
+  pixel_noise->prepare(contour_inputs(), image_size(), bin.tile_starts);
+  if (shown_normals) blend_normals();
+  if (!defers_image()) pixel_noise->forward(contour_inputs(), aggregate.image, image_size());
   seen_layers_ = front_layers();
 }
 
@@ -253,13 +261,16 @@ void Renderer::Impl::render(const Band& band) {
 
 void Renderer::Impl::shade_and_aggregate() {
   if (!defers_image()) {
-    shade.forward(shade_inputs());
     if (!aggregate.perturbs_distances()) occupancy.forward(frame, bin, rasterize);
     if (sees_through()) opacity.forward(shade.arguments(shade_inputs()), *geometry, bin, rasterize);
+    if (shown_normals) shade_normals();
+    shade.forward(shade_inputs());
     aggregate.forward(aggregate_inputs(), scene.background);
   }
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
+  if (shown_normals)
+    shown_normals->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
   pixel_noise->unblend();
 }
 
@@ -372,26 +383,6 @@ void Renderer::Impl::differentiate(const BufferRef<cl_float4>& grad_images) {
     for (std::size_t light = 0; light < shade.light_launches(); ++light)
       shade.backward_light(shade_inputs(), light);
   }
-}
-
-std::size_t Renderer::Impl::bytes() const {
-  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
-         rasterize.bytes() + shade.bytes() + occupancy.bytes() + opacity.bytes() + aggregate.bytes() +
-         (texels ? texels->bytes() : 0) + (texel_opacities ? texel_opacities->bytes() : 0) + gather.bytes() +
-         reduce.bytes() + tangents.bytes() + (aov ? aov->bytes() : 0) +
-         (surface_samples ? surface_samples->bytes() : 0) + own_samples_.capacity_bytes() +
-         own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() + own_group_.capacity_bytes() +
-         own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
-         (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
-         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
-         spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +
-         grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
-         grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
-         grad_materials.capacity_bytes() + grad_opacities.capacity_bytes() + grad_numbers.capacity_bytes() +
-         gradient_sums_.capacity_bytes() + (gradient_map ? gradient_map->bytes() : 0) +
-         aov_surface.capacity_bytes() + aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
-         all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() +
-         (corner_texcoords ? corner_texcoords->bytes() : 0);
 }
 
 void Renderer::forward() { impl_->forward(); }

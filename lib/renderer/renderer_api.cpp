@@ -151,4 +151,24 @@ RenderStatistics Renderer::statistics() const {
   return s;
 }
 
+std::size_t Renderer::Impl::bytes() const {
+  return (geometry ? geometry->bytes() : 0) + transform.bytes() + setup.bytes() + clip.bytes() + bin.bytes() +
+         rasterize.bytes() + shade.bytes() + occupancy.bytes() + opacity.bytes() + aggregate.bytes() +
+         (texels ? texels->bytes() : 0) + (texel_opacities ? texel_opacities->bytes() : 0) + gather.bytes() +
+         reduce.bytes() + tangents.bytes() + (shown_normals ? shown_normals->bytes() : 0) +
+         (aov ? aov->bytes() : 0) + (surface_samples ? surface_samples->bytes() : 0) +
+         own_samples_.capacity_bytes() + own_pixels_.capacity_bytes() + own_tangents_.capacity_bytes() +
+         own_group_.capacity_bytes() + own_image_.capacity_bytes() + grad_group_.capacity_bytes() +
+         (pixel_noise ? pixel_noise->bytes() : 0) + ViewSet::bytes() + hidden_.capacity_bytes() +
+         spare_views_.bytes() + spare_values_.capacity_bytes() + spare_view_positions_.capacity_bytes() +
+         spare_view_colors_.capacity_bytes() + packed_.capacity_bytes() + grad_images_.capacity_bytes() +
+         grad_vertices.capacity_bytes() + grad_lit.capacity_bytes() + grad_colors.capacity_bytes() +
+         grad_texcoords.capacity_bytes() + material_channels.capacity_bytes() +
+         grad_materials.capacity_bytes() + grad_opacities.capacity_bytes() + grad_numbers.capacity_bytes() +
+         gradient_sums_.capacity_bytes() + (gradient_map ? gradient_map->bytes() : 0) +
+         aov_surface.capacity_bytes() + aov_coverage.capacity_bytes() + all_pixels_.starts.capacity_bytes() +
+         all_views_.starts.capacity_bytes() + pixel_parts_.capacity_bytes() +
+         (corner_texcoords ? corner_texcoords->bytes() : 0);
+}
+
 }  // namespace dpr

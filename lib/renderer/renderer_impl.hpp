@@ -13,6 +13,7 @@
 #include "renderer/gradient_map.hpp"
 #include "renderer/mesh_arrays.hpp"
 #include "renderer/pixel_noise.hpp"
+#include "renderer/shown_normals.hpp"
 #include "stages/aggregate.hpp"
 #include "stages/attribute.hpp"
 #include "stages/auxiliary.hpp"
@@ -124,7 +125,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void backward_on_device(const BufferRef<cl_float4>& grad_images);
   /// Throws InvalidArgument unless images have derivatives along the directions.
   void require_tangents(std::span<const SceneTangent> directions) const;
-  /// Fills `tangents.images` with the derivatives of the last frame's images. After require_forward() and
+  /// Fills `tangents.shown.images` with the derivatives of the last frame's images. After require_forward() and
   /// require_tangents().
   void tangent(std::span<const SceneTangent> directions);
   std::size_t tangent_bytes() const;
@@ -221,6 +222,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   Gather gather;
   Reduce reduce;
   Tangents tangents;
+  std::optional<ShownNormals> shown_normals;          // beside colours: see show_normals()
   std::optional<SampledSurface> surface_samples;      // made when first asked for
   std::optional<Exchange> exchange;                   // made when first asked for
   Raster raster;                                      // around the frame
@@ -300,6 +302,12 @@ struct Renderer::Impl : OnDevice, ViewSet {
   void find_contours(const std::optional<FrameCounts>& expected);
   void finish_image();
   void shade_and_aggregate();
+  void shade_normals();
+  void blend_normals();
+  void move_normals(std::size_t first);
+  void blend_normal_tangents(Buffer<cl_float4>& pixels);
+  std::vector<ImageTangents*> shown_tangents();
+  void smooth_tangents();
   void differentiate(const BufferRef<cl_float4>& grad_images);
   void differentiate_in_bands(const BufferRef<cl_float4>& grad_images);
   void add_pixel_channels(const Range& rows);

@@ -183,6 +183,7 @@ void Renderer::Impl::set_scene(const Scene& wanted, std::size_t views_of_faces) 
   reserved.reset();
   if (pixel_noise) pixel_noise->edges.reset();
   corner_texcoords.reset();
+  shown_normals.reset();
 }
 
 void Renderer::Impl::set_views(std::span<const View> new_views, std::size_t first_view) {

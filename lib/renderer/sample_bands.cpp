@@ -59,7 +59,7 @@ std::size_t Renderer::Impl::sample_bytes() const {
 }
 
 std::vector<Range> Renderer::Impl::cut_samples() const {
-  if (!pixel_noise || pixel_noise->sampled || aggregate.perturbs_distances()) return {};
+  if (!pixel_noise || pixel_noise->sampled || aggregate.perturbs_distances() || shown_normals) return {};
   const std::size_t rows = tile_rows_of(frame).count, budget = device.memory_budget();
   if (pixels_of(frame) * sample_bytes() <= budget) return {};
   // Half of the budget is the fragments'.

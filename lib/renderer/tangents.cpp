@@ -198,10 +198,10 @@ void Renderer::Impl::require_tangents(std::span<const SceneTangent> directions) 
 /// Device memory of a direction's numbers but those of fragments.
 std::size_t Renderer::Impl::tangent_bytes() const {
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height,
-                    of_vertices = std::size_t{frame.views} * frame.vertices;
+                    of_vertices = std::size_t{frame.views} * frame.vertices, shown = shown_normals ? 2 : 1;
   const std::size_t clipped = frame.clips != 0 ? of_vertices + 4 * std::size_t{frame.views} * frame.faces : 0;
   return sizeof(cl_float4) * (2 * of_vertices + clipped + (shade.lit() ? transform.world.size() : 0)) +
-         (pixel_noise ? samples * (2 * sizeof(cl_float4) + Antialias::k_tangent_bytes) : 0);
+         (pixel_noise ? samples * (shown * 2 * sizeof(cl_float4) + Antialias::k_tangent_bytes) : 0);
 }
 
 /// Bands whose fragments have memory for tangents along so many directions: the frame's own, or smaller ones.
@@ -240,11 +240,13 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
   require_whole();
   if (std::ranges::any_of(directions, moves_opacities)) follow_opacities();
   const std::size_t samples = std::size_t{frame.views} * frame.width * frame.height;
-  tangents.images.resize(impl_of(device), directions.size() * image().size());
+  for (ImageTangents* of : shown_tangents())
+    of->images.resize(impl_of(device), directions.size() * image().size());
   cut_for_tangents(tangents_together(directions.size()));
   if (pixel_noise) see_layers(front_layers());
   move_in_groups(directions, [&](std::size_t first, std::size_t count) {
-    if (pixel_noise) tangents.rasters.resize(impl_of(device), count * samples);
+    for (ImageTangents* of : shown_tangents())
+      if (pixel_noise) of->rasters.resize(impl_of(device), count * samples);
     if (geometry_colors) geometry_colors->tangent(frame, *geometry, transform, tangents);
     if (shade.lit()) shade.tangent_of_normals(shade_inputs(), tangents);
     for (const Band& band : bands) {
@@ -254,12 +256,37 @@ void Renderer::Impl::tangent(std::span<const SceneTangent> directions) {
       if (sees_through())
         opacity.tangent(shade.arguments(shade_inputs(), tangents), *geometry, bin, rasterize,
                         tangents.opacities, shade.surface ? &*shade.surface : nullptr);
+      const std::size_t place = pixel_noise ? 0 : first;
+      if (shown_normals) move_normals(place);
       shade.tangent(shade_inputs(), tangents);
-      aggregate.tangent(aggregate_inputs(), scene.background, tangents, pixel_noise ? 0 : first,
-                        pixel_noise ? tangents.rasters : tangents.images);
+      aggregate.tangent(aggregate_inputs(), scene.background, tangents, place,
+                        pixel_noise ? tangents.shown.rasters : tangents.shown.images);
     }
-    if (pixel_noise) pixel_noise->tangent(contour_inputs(), image_size(), tangents, aggregate.scratch(frame));
+    if (pixel_noise) smooth_tangents();
   });
+}
+
+/// From the tangents of a group's samples to those of its pixels.
+void Renderer::Impl::smooth_tangents() {
+  const std::size_t count = tangents.params.directions * pixel_count();
+  for (ImageTangents* of : shown_tangents()) {
+    const bool are_all = of->images.size() == count;
+    Buffer<cl_float4>& pixels = are_all ? of->images : of->of_group;
+    if (of == &tangents.shown) {
+      pixel_noise->tangent(contour_inputs(), image_size(), tangents, of->rasters, pixels,
+                           aggregate.scratch(frame));
+    } else {
+      blend_normal_tangents(pixels);
+    }
+    if (!are_all) pixels.copy_to(of->images, tangents.first * pixel_count());
+  }
+}
+
+/// Of colours, and of normals if they are shown too.
+std::vector<ImageTangents*> Renderer::Impl::shown_tangents() {
+  std::vector<ImageTangents*> all{&tangents.shown};
+  if (shown_normals) all.push_back(&shown_normals->tangents);
+  return all;
 }
 
 std::vector<Image> Renderer::tangent(std::span<const SceneTangent> directions) {
@@ -272,7 +299,7 @@ std::vector<Image> Renderer::tangent(std::span<const SceneTangent> directions) {
   std::size_t first = 0;
   for (Image& image : images) {
     const auto bytes = std::as_writable_bytes(std::span(image.pixels));
-    reads.start(m.tangents.images.cl_buffer(), first * sizeof(cl_float4), bytes);
+    reads.start(m.tangents.shown.images.cl_buffer(), first * sizeof(cl_float4), bytes);
     first += image.pixels.size();
   }
   reads.finish();

@@ -57,15 +57,15 @@ bool is_significant(const NormalEquations& equations, std::size_t parameters) {
 }
 
 /// The step to try next, no longer than a linear model reaches; none if the candidate stands still.
-bool next_step(Candidate& candidate, const PoseSpace& space, double pixel_ndc, PoseSpace::Step& step) {
+bool next_step(Candidate& candidate, const PoseSpace& space, double still_ndc, PoseSpace::Step& step) {
   const NormalEquations& equations = candidate.equations;
   while (candidate.damping < k_most_damping &&
          !damped_step(equations, space.size(), candidate.damping, step)) {
     candidate.damping *= k_damping_rise;
   }
   const double length = space.length(step);
-  candidate.is_still = candidate.damping >= k_most_damping || length < k_still_pixels * pixel_ndc ||
-                       !is_significant(equations, space.size());
+  candidate.is_still =
+      candidate.damping >= k_most_damping || length < still_ndc || !is_significant(equations, space.size());
   if (length > k_longest_step_ndc) {
     for (double& s : step) s *= k_longest_step_ndc / length;
   }
@@ -173,13 +173,16 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
   std::vector<double> losses;
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
     losses.push_back(least_loss(candidates));
-    if (iteration >= turns.enough && !still_falls(losses)) break;
+    const bool is_enough = iteration >= turns.enough;
+    if (is_enough && !turns.longer_pixels && !still_falls(losses)) break;
+    const double still_pixels = is_enough ? turns.longer_pixels.value_or(k_still_pixels) : k_still_pixels;
     if (!report()) return false;
     std::vector<Candidate*> moving;
     std::vector<Hypothesis> hypotheses;
     for (Candidate& candidate : candidates) {
       PoseSpace::Step step{};
-      if (candidate.is_still || !next_step(candidate, space, level.pixel_ndc(), step)) continue;
+      if (candidate.is_still || !next_step(candidate, space, still_pixels * level.pixel_ndc(), step))
+        continue;
       moving.push_back(&candidate);
       hypotheses.push_back(space.moved(candidate.hypothesis, step));
     }

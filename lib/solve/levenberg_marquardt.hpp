@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "solve/pose_level.hpp"
@@ -43,10 +44,11 @@ struct Turns {
   unsigned enough, most;
   bool is_end =
       false;  ///< of the work on candidates: what only another turn would need is not found in the last one
+  std::optional<double> longer_pixels = {};  ///< after enough turns only longer steps are taken, fall or not
 };
 
-/// Turns every candidate until it stands still or often enough, and on as long as the best still falls, all
-/// in the same launches. `report` is called after each iteration; false stops. Returns false if it was
+/// Turns every candidate until it stands still or often enough, and on as long as the best still falls, or steps are
+/// long, all in the same launches. `report` is called after each iteration; false stops. Returns false if it was
 /// stopped.
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report);

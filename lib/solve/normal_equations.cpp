@@ -82,7 +82,11 @@ ViewSums NormalSums::weigh(const HypothesisImages& images, std::span<const float
     }
   }
   fits_.upload(d, fits);
-  active_.upload(d, active);
+  if (active != uploaded_active_) {
+    uploaded_active_.clear();
+    active_.upload(d, active);
+    uploaded_active_ = active;
+  }
   residuals_.resize(d, 4 * images.views * pixels_);
   const std::size_t count = 1 + k_channels * light_sums();
   return sums_.sum(count, 1, active.size(), [&](std::size_t items, Buffer<float>& into) {

@@ -145,6 +145,7 @@ class NormalSums {
   Buffer<cl_float4> target_;
   Buffer<float> weights_, fits_, residuals_, lit_, left_, taken_, cells_, units_;
   Buffer<cl_uint> active_;
+  std::vector<cl_uint> uploaded_active_;  // what that holds
 };
 
 }  // namespace dpr

@@ -19,6 +19,7 @@ constexpr std::size_t k_most_pixels = std::size_t{1} << 20;
 constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 
 constexpr double k_color_channels = 3;
+constexpr const char* k_level = "PictureLevel";     // in errors
 constexpr std::size_t k_coverage = 0, k_depth = 1;  // kinds of MeasuredWeights
 
 /// Positions and faces alone, black.
@@ -38,23 +39,24 @@ Scene shapes_alone(Scene scene) {
   return scene;
 }
 
-/// Each mesh coloured by its normals in the body's axes. Directions of light turn with the body: meshes that stand
-/// still have normals only where the body's rotation is nearly known, and else are seen in the mean light.
-Scene with_normals(const Scene& scene, const PoseBody& body, CornerNormals normals,
-                   const std::optional<glm::dmat3>& rotation) {
-  Scene result = scene;
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    const Mesh& mesh = mesh_of(scene, i);
-    const glm::mat4& transform = scene.meshes[i].transform;
-    result.meshes[i] = {shape_of(mesh), transform};
-    if (rotation) {
-      result.meshes[i].mesh =
-          colored_by_normals(mesh, glm::transpose(*rotation) * glm::dmat3(transform), normals);
+/// Gives each mesh normals in the body's axes. Directions of light turn with the body: meshes that stand still have
+/// normals only where the body's rotation is nearly known, and else are seen in the mean light.
+void give_normals(Scene& scene, const PoseBody& body, CornerNormals normals,
+                  const std::optional<glm::dmat3>& rotation) {
+  for (std::size_t i = scene.meshes.size(); i-- > 0;) {  // instances before their meshes
+    Instance& instance = scene.meshes[i];
+    const auto part = std::ranges::find(body.parts(), i, &BodyPart::mesh);
+    const bool moves = part != body.parts().end();
+    if (instance.instance_of) instance = {mesh_of(scene, i), instance.transform};
+    if (moves || rotation) {
+      give_normals(instance.mesh,
+                   moves ? part->linear : glm::transpose(*rotation) * glm::dmat3(instance.transform),
+                   normals);
+    } else {
+      instance.mesh.normals.clear();
+      instance.mesh.face_normals.clear();
     }
   }
-  for (const BodyPart& part : body.parts())
-    result.meshes[part.mesh].mesh = colored_by_normals(mesh_of(scene, part.mesh), part.linear, normals);
-  return result;
 }
 
 /// Part of every pixel, in images of a level's size, that may show the object: that which lies in the box, or close to
@@ -109,16 +111,17 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
   Scene whole = level_scene(scene, space_, options, shape, light);
   if (has_unknown_background_) whole.background = glm::vec3(0);
   const std::vector<View> lenses = space_.seen_through_lenses(whole.camera);
-  const auto show = [&](Images& images, const Scene& shown) {
-    images.renderer.set_scene(subdivide_for_lens(shown, {}, lenses).scene);
-  };
+  if (!options.depth.image.pixels.empty()) {
+    depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true});
+    depths_->renderer.set_scene(subdivide_for_lens(shapes_alone(whole), {}, lenses).scene);
+  }
+  if (light == PoseLight::harmonics) give_normals(whole, space_.body(), normals, rotation);
   scene_ = subdivide_for_lens(whole, {}, lenses).scene;
   colors_.renderer.set_scene(scene_);
   if (light == PoseLight::harmonics) {
-    show(normals_.emplace(Images{Renderer(device)}), with_normals(whole, space_.body(), normals, rotation));
+    show_normals(colors_.renderer);
+    normals_.emplace();
   }
-  if (!options.depth.image.pixels.empty())
-    show(depths_.emplace(Images{.renderer = Renderer(device), .shows_depths = true}), shapes_alone(whole));
   target_.background = scene.background;
   target_.has_unknown_background = has_unknown_background_;
   mask_ = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
@@ -190,14 +193,15 @@ void PictureLevel::render(Images& images, std::span<const View> views) {
   images.renderer.set_views(views);
   if (images.shows_depths) show_depths(images.renderer);
   images.renderer.forward();
-  if (samples_ > 1) averaged(last_frame(images.renderer, "PictureLevel").image, images.means);
+  averaged(last_frame(images.renderer, k_level).image, images.means.images);
 }
 
 const Buffer<cl_float4>& PictureLevel::rendered(const Images& images) const {
-  return samples_ > 1 ? images.means : last_frame(images.renderer, "PictureLevel").image;
+  return samples_ > 1 ? images.means.images : last_frame(images.renderer, k_level).image;
 }
 
 const Buffer<cl_float4>& PictureLevel::averaged(const Buffer<cl_float4>& samples, Buffer<cl_float4>& means) {
+  if (samples_ == 1) return samples;
   sums_->average(samples, static_cast<std::size_t>(width()), static_cast<std::size_t>(samples_), means);
   return means;
 }
@@ -209,12 +213,14 @@ HypothesisImages PictureLevel::render(std::span<const Hypothesis> hypotheses) {
     const std::vector<View> views = views_of(hypotheses);
     if (depths_) render(*depths_, views);
     if (!are_depths_alone) render(colors_, views);
-    if (normals_) render(*normals_, views);
+    if (normals_) averaged(last_normals(colors_.renderer, k_level), normals_->images);
     shown_.assign(hypotheses.begin(), hypotheses.end());
   }
   const Buffer<cl_float4>& colors = rendered(are_depths_alone ? *depths_ : colors_);
-  return {hypotheses.size(), colors, normals_ ? rendered(*normals_) : colors,
-          depths_ ? rendered(*depths_) : colors};
+  const Buffer<cl_float4>& normals = !normals_      ? colors
+                                     : samples_ > 1 ? normals_->images
+                                                    : last_normals(colors_.renderer, k_level);
+  return {hypotheses.size(), colors, normals, depths_ ? rendered(*depths_) : colors};
 }
 
 std::pair<HypothesisImages, HypothesisTangents> PictureLevel::render_tangents(
@@ -226,12 +232,13 @@ std::pair<HypothesisImages, HypothesisTangents> PictureLevel::render_tangents(
       directions[k].views.push_back(space_.view_tangent(hypothesis, scene_.camera, k));
   }
   const auto tangents_of = [&](Images& of) -> const Buffer<cl_float4>& {
-    const Buffer<cl_float4>& samples = last_tangents(of.renderer, directions, "PictureLevel");
-    return samples_ == 1 ? samples : averaged(samples, of.tangents);
+    return averaged(last_tangents(of.renderer, directions, k_level), of.means.tangents);
   };
   const Buffer<cl_float4>* const depths = depths_ ? &tangents_of(*depths_) : nullptr;
   const Buffer<cl_float4>& colors = depths != nullptr && !counts_colors_ ? *depths : tangents_of(colors_);
-  return {images, {colors, normals_ ? tangents_of(*normals_) : colors, depths != nullptr ? *depths : colors}};
+  const Buffer<cl_float4>* const normals =
+      normals_ ? &averaged(last_normal_tangents(colors_.renderer), normals_->tangents) : nullptr;
+  return {images, {colors, normals != nullptr ? *normals : colors, depths != nullptr ? *depths : colors}};
 }
 
 void PictureLevel::estimate_scale(std::span<const Hypothesis> hypotheses) {

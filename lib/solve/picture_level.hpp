@@ -76,11 +76,15 @@ class PictureLevel {
   double pixel_ndc() const;
 
  private:
+  /// Means over the samples of pixels, and of their tangents; empty where pixels are samples.
+  struct Means {
+    Buffer<cl_float4> images, tangents;
+  };
   /// A renderer of a level, and what becomes of its images.
   struct Images {
     Renderer renderer;
     bool shows_depths = false;
-    Buffer<cl_float4> means{}, tangents{};
+    Means means{};
   };
 
   /// Hands the hypotheses to a visitor in batches that fit the device, of which each has so many images.
@@ -106,7 +110,8 @@ class PictureLevel {
   bool is_finest_;
   Scene scene_;  // of the samples' size
   Images colors_;
-  std::optional<Images> normals_, depths_;
+  std::optional<Images> depths_;
+  std::optional<Means> normals_;          // which the frames of colours show too
   std::vector<Hypothesis> shown_;         // by all images
   bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
   bool has_unknown_background_, weighs_observations_;

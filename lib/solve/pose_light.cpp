@@ -97,21 +97,17 @@ std::vector<glm::dvec3> given_normals(const Mesh& mesh, const glm::dmat3& stretc
 
 }  // namespace
 
-Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals) {
+void give_normals(Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals) {
   const std::vector<glm::dvec3> of_corners =
       mesh.face_normals.empty() ? normals_of_faces(mesh, stretch, normals) : given_normals(mesh, stretch);
-  Mesh result;
-  for (const glm::uvec3& f : mesh.faces) {
-    const auto first = static_cast<unsigned>(result.positions.size());
-    result.faces.emplace_back(first, first + 1, first + 2);
-    for (int k = 0; k < 3; ++k) {
-      const glm::dvec3& normal = of_corners[result.positions.size()];
-      const double length = glm::length(normal);
-      result.positions.push_back(mesh.positions[f[k]]);
-      result.vertex_colors.emplace_back(length > 0 ? normal / length : normal);
-    }
+  mesh.normals.clear();
+  mesh.face_normals.clear();
+  for (const glm::dvec3& normal : of_corners) {
+    const double length = glm::length(normal);
+    mesh.normals.emplace_back(length > 0 ? normal / length : normal);
   }
-  return result;
+  for (unsigned face = 0; face < mesh.faces.size(); ++face)
+    mesh.face_normals.emplace_back(3 * face, 3 * face + 1, 3 * face + 2);
 }
 
 }  // namespace dpr

@@ -33,8 +33,7 @@ ChannelLight solve_light(const LightSums& sums);
 /// no sharp edge parts from theirs, or over all.
 enum class CornerNormals { parted, smooth };
 
-/// The mesh with a corner of its own for each corner of each face, coloured by its unit normal after
-/// `stretch`.
-Mesh colored_by_normals(const Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals);
+/// Gives the mesh unit normals of each corner of each face, after `stretch`: those of a surface without extent are 0.
+void give_normals(Mesh& mesh, const glm::dmat3& stretch, CornerNormals normals);
 
 }  // namespace dpr

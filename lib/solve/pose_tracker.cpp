@@ -206,14 +206,13 @@ std::size_t PoseTracker::Impl::first_level() const {
   return last > 0 && surprise > k_near_pixels * levels->pixel_ndc(last) ? last - 1 : last;
 }
 
-/// One hypothesis, in few steps.
+/// One hypothesis, in few steps, and more while those are long.
 Candidate PoseTracker::Impl::follow_from(std::size_t level, const Pose& pose) {
-  constexpr unsigned k_coarse_steps = 3, k_fine_steps = 3;
+  constexpr Turns k_turns{.enough = 3, .most = 6, .is_end = true, .longer_pixels = 0.1};
   std::vector<Candidate> one{{{pose}}};
   for (; level < levels->size(); ++level) {
-    const unsigned steps = level + 1 < levels->size() ? k_coarse_steps : k_fine_steps;
     one.front().restart();
-    refine(levels->at(level), levels->space(), one, {steps, steps, true}, k_go_on);
+    refine(levels->at(level), levels->space(), one, k_turns, k_go_on);
   }
   return one.front();
 }

@@ -54,6 +54,8 @@ void Contour::count(const ContourInputs& in) {
                                                 .faces = in.geometry.face_vertices,
                                                 .clipped = in.clipped,
                                                 .colors = in.geometry.colors_of(in.p),
+                                                .normal_faces = in.normal_faces,
+                                                .normals = in.normals,
                                                 .counts = pair_starts,
                                                 .kinds = kinds_});
   scan_(view_edges(in), pair_starts);

@@ -23,6 +23,8 @@ struct ContourInputs {
   const Transform& transform;
   const Buffer<cl_uchar>& facing;              ///< [view][face] Setup::facing
   const Buffer<shared::ClippedFace>& clipped;  ///< [view][face] where p.clips is set
+  const Buffer<cl_uint4>& normal_faces;        ///< [face] of frames that show normals beside colours
+  const Buffer<cl_float4>& normals;            ///< [normal]
 };
 
 /// Tells a frame of its contours, once it is known whether faces are clipped. `shading` of a lit scene.

@@ -82,16 +82,34 @@ void Shade::forward(const ShadeInputs& in) {
     find_normals(in);
     now_.kernels->shade(pairs, kernel::shade_lit_forward::pick(arguments(in)));
   } else if (!is_textured) {
-    const PairGroups groups = in.rasterize.pair_groups(in.bin);
-    launch_(groups.count, kernel::shade_forward{.p = in.p,
-                                                .range = groups.pairs,
-                                                .pairs = in.bin.pair_count,
-                                                .pair_face = in.bin.pair_face,
-                                                .fragment_starts = in.rasterize.fragment_starts,
-                                                .faces = in.geometry.face_vertices,
-                                                .colors = in.geometry.colors_of(in.p),
-                                                .fragments = in.rasterize.values});
+    interpolate(in, in.p, {in.geometry.face_vertices, in.geometry.colors_of(in.p)});
   }
+}
+
+namespace {
+
+/// The frame whose triangles show vectors of their own list, the same in all views.
+shared::FrameParams showing_vectors(shared::FrameParams p) {
+  p.color_faces = p.color_stride = 0;
+  return p;
+}
+
+}  // namespace
+
+void Shade::forward(const ShadeInputs& in, const CornerVectors& vectors) {
+  interpolate(in, showing_vectors(in.p), vectors);
+}
+
+void Shade::interpolate(const ShadeInputs& in, const shared::FrameParams& p, const CornerVectors& colors) {
+  const PairGroups groups = in.rasterize.pair_groups(in.bin);
+  launch_(groups.count, kernel::shade_forward{.p = p,
+                                              .range = groups.pairs,
+                                              .pairs = in.bin.pair_count,
+                                              .pair_face = in.bin.pair_face,
+                                              .fragment_starts = in.rasterize.fragment_starts,
+                                              .faces = colors.faces,
+                                              .colors = colors.values,
+                                              .fragments = in.rasterize.values});
 }
 
 void Shade::find_normals(const ShadeInputs& in) {
@@ -211,22 +229,35 @@ void Shade::tangent(const ShadeInputs& in, Tangents& tangents) {
   if (is_textured) {
     surface->tangent(all, pairs);
   } else if (!lit() || tangents.params.colors != 0) {
-    const PairGroups groups = in.rasterize.pair_groups(in.bin);
-    launch_(groups.count, kernel::shade_tangent{.p = in.p,
-                                                .range = groups.pairs,
-                                                .q = tangents.params,
-                                                .pairs = in.bin.pair_count,
-                                                .pair_face = in.bin.pair_face,
-                                                .fragment_starts = in.rasterize.fragment_starts,
-                                                .faces = in.geometry.face_vertices,
-                                                .colors = in.geometry.colors_of(in.p),
-                                                .color_tangents = tangents.colors,
-                                                .fragments = in.rasterize.values,
-                                                .tangents = tangents.fragments});
+    interpolate_tangent(in, in.p, {in.geometry.face_vertices, in.geometry.colors_of(in.p)}, tangents.params,
+                        tangents);
   }
   if (!lit()) return;
   if (!now_.kernels->tangent) now_.kernels->tangent.emplace(device_, shading_options(now_.kernels->model));
   (*now_.kernels->tangent)(pairs, kernel::shade_lit_tangent::pick(all));
+}
+
+void Shade::tangent(const ShadeInputs& in, const CornerVectors& vectors, Tangents& tangents) {
+  shared::TangentParams still = tangents.params;
+  still.colors = 0;
+  interpolate_tangent(in, showing_vectors(in.p), vectors, still, tangents);
+}
+
+void Shade::interpolate_tangent(const ShadeInputs& in, const shared::FrameParams& p,
+                                const CornerVectors& colors, const shared::TangentParams& q,
+                                Tangents& tangents) {
+  const PairGroups groups = in.rasterize.pair_groups(in.bin);
+  launch_(groups.count, kernel::shade_tangent{.p = p,
+                                              .range = groups.pairs,
+                                              .q = q,
+                                              .pairs = in.bin.pair_count,
+                                              .pair_face = in.bin.pair_face,
+                                              .fragment_starts = in.rasterize.fragment_starts,
+                                              .faces = colors.faces,
+                                              .colors = colors.values,
+                                              .color_tangents = tangents.colors,
+                                              .fragments = in.rasterize.values,
+                                              .tangents = tangents.fragments});
 }
 
 std::size_t Shade::bytes() const {

@@ -55,6 +55,12 @@ struct ShadeInputs {
   Rasterize& rasterize;
 };
 
+/// Vectors that triangles show at their corners, without light.
+struct CornerVectors {
+  const Buffer<cl_uint4>& faces;  ///< [face] indices into `values`, by corner
+  const Buffer<cl_float4>& values;
+};
+
 class Shade {
  public:
   explicit Shade(Device::Impl& device) : device_(device), launch_(device) {}
@@ -90,6 +96,8 @@ class Shade {
   std::size_t light_channel_count() const;
 
   void forward(const ShadeInputs& in);
+  /// Vectors in place of colours.
+  void forward(const ShadeInputs& in, const CornerVectors& vectors);
   /// Fills the gradients of barycentrics and corner colours, if textured of texture coordinates, and, if lit,
   /// of corner positions, normals, materials and the eye.
   void backward(const ShadeInputs& in);
@@ -116,6 +124,8 @@ class Shade {
   /// From the tangents of the band's fragments' barycentrics, and of all that colours are made of, to those of
   /// colours.
   void tangent(const ShadeInputs& in, Tangents& tangents);
+  /// The same of vectors, which stay as they are.
+  void tangent(const ShadeInputs& in, const CornerVectors& vectors, Tangents& tangents);
 
   std::optional<Surface> surface;        ///< of textured scenes: made for the first of them
   Buffer<float> grad_pairs;              ///< [p.pairs] of each DPR_PAIR_...
@@ -128,6 +138,9 @@ class Shade {
  private:
   Device::Impl& device_;
   Launcher<kernel::shade_forward, kernel::shade_backward, kernel::shade_tangent> launch_;
+  void interpolate(const ShadeInputs& in, const shared::FrameParams& p, const CornerVectors& colors);
+  void interpolate_tangent(const ShadeInputs& in, const shared::FrameParams& p, const CornerVectors& colors,
+                           const shared::TangentParams& q, Tangents& tangents);
   bool is_flat() const { return now_.kernels->model.shading == Shading::flat; }
   void find_normals(const ShadeInputs& in);
 

@@ -6,6 +6,18 @@
 
 namespace dpr {
 
+/// Tangents of the images that show something.
+struct ImageTangents {
+  Buffer<cl_float4>
+      rasters;  ///< [direction][view][sample] of noise on the pixel, before contours are blended
+  Buffer<cl_float4> of_group;  ///< as `images`, along the group's directions, where there are several groups
+  Buffer<cl_float4> images;    ///< [direction][view][height][width] RGBA, of all directions
+
+  std::size_t bytes() const {
+    return rasters.capacity_bytes() + of_group.capacity_bytes() + images.capacity_bytes();
+  }
+};
+
 /// As many directions at a time as there is memory for, from `first` on.
 struct Tangents {
   shared::TangentParams params{};
@@ -22,16 +34,13 @@ struct Tangents {
   Buffer<cl_float4> outlines;  ///< [direction][view][face][4] of clipped faces (kernels/clip_tangent.cl)
   Buffer<float> fragments;     ///< [direction][planes][p.grad_fragments], and what is the same for all
   Buffer<cl_float4> shares;    ///< [p.grad_fragments][direction] RGBA of their pixels
-  Buffer<cl_float4>
-      rasters;               ///< [direction][view][sample] of noise on the pixel, before contours are blended
-  Buffer<cl_float4> images;  ///< [direction][view][height][width] RGBA, of all directions
+  ImageTangents shown;         ///< of colours
 
   std::size_t bytes() const {
     return views.capacity_bytes() + models.capacity_bytes() + frames.capacity_bytes() +
            positions.capacity_bytes() + colors.capacity_bytes() + opacities.capacity_bytes() +
            ndc.capacity_bytes() + world.capacity_bytes() + clip.capacity_bytes() + outlines.capacity_bytes() +
-           fragments.capacity_bytes() + shares.capacity_bytes() + rasters.capacity_bytes() +
-           images.capacity_bytes();
+           fragments.capacity_bytes() + shares.capacity_bytes() + shown.bytes();
   }
 };
 

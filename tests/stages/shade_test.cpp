@@ -6,6 +6,7 @@
 #include <map>
 
 #include "check/comparison.hpp"
+#include "check/scenes.hpp"
 #include "dpr/dpr.hpp"
 #include "renderer/renderer_impl.hpp"
 #include "support/aggregate_errors.hpp"

@@ -65,7 +65,15 @@ class ContourFrame {
     Buffer<cl_uint> tile_counts;
     setup.forward(p, views, geometry, transform.ndc, hidden_, tile_counts);
     set_edges(p, edges, shading, depth_reach);
-    return {p, views, geometry, edges, transform, setup.facing, clipped};
+    return {p,
+            views,
+            geometry,
+            edges,
+            transform,
+            setup.facing,
+            clipped,
+            geometry.face_vertices,
+            geometry.color_values};
   }
 
   std::size_t samples() const { return std::size_t{p.width} * p.height; }
