@@ -34,7 +34,7 @@ std::size_t ShownNormals::bytes() const {
 
 namespace {
 
-/// The frame about the normals alone.
+/// The frame as crossings are found for the normals.
 shared::FrameParams about_normals(shared::FrameParams p) {
   p.shading = DPR_NORMALS;
   return p;
@@ -47,7 +47,7 @@ ContourInputs with_frame(const ContourInputs& in, const shared::FrameParams& p) 
 
 }  // namespace
 
-/// Of the fragments that are there; colours have to be shaded after it.
+/// Of the fragments that are there, in place of whose colours it leaves normals.
 void Renderer::Impl::shade_normals() {
   shade.forward(shade_inputs(), shown_normals->at_corners());
   std::swap(aggregate.image, shown_normals->raster);
@@ -55,7 +55,7 @@ void Renderer::Impl::shade_normals() {
   std::swap(aggregate.image, shown_normals->raster);
 }
 
-/// From their samples to their image, in which they jump where they do themselves.
+/// From the samples of the normals to their image.
 void Renderer::Impl::blend_normals() {
   const shared::FrameParams p = about_normals(frame);
   ShownNormals& n = *shown_normals;
@@ -71,7 +71,8 @@ void Renderer::Impl::blend_normal_tangents(Buffer<cl_float4>& pixels) {
                        n.tangents.rasters, pixels, aggregate.scratch(frame));
 }
 
-/// The same for tangents, of a group's directions from `first` on.
+/// The tangents of the normals' samples along a group's directions, to images from the direction `first` on. Leaves
+/// colours as they were.
 void Renderer::Impl::move_normals(std::size_t first) {
   ImageTangents& moved = shown_normals->tangents;
   shade.forward(shade_inputs(), shown_normals->at_corners());
