@@ -81,19 +81,20 @@ std::vector<SceneTangent> directions_of(const Renderer& renderer, std::size_t co
   return directions;
 }
 
-void check_same(const Frames& found, const Frames& expected, double tolerance) {
+void check_same(const Frames& found, const Frames& expected) {
   const auto compare = [&](const std::vector<cl_float4>& a, const std::vector<cl_float4>& b) {
+    constexpr double k_tolerance = 1e-6;
     REQUIRE(a.size() == b.size());
-    Worst worst;
     double largest = 0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      for (int c = 0; c < 4; ++c) {
-        worst.add(std::abs(static_cast<double>(a[i].s[c]) - static_cast<double>(b[i].s[c])), "value", i, c);
-        largest = std::max(largest, std::abs(static_cast<double>(b[i].s[c])));
-      }
-    }
+    for (const cl_float4& pixel : b)
+      for (const float value : pixel.s) largest = std::max(largest, std::abs(static_cast<double>(value)));
     REQUIRE(largest > 0.1);
-    DPR_CHECK_WORST(worst, tolerance * largest);
+    Worst worst;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (int c = 0; c < 4; ++c)
+        worst.add(std::abs(static_cast<double>(a[i].s[c]) - static_cast<double>(b[i].s[c])), "value", i, c);
+    }
+    DPR_CHECK_WORST(worst, k_tolerance * largest);
   };
   compare(found.image, expected.image);
   compare(found.tangents, expected.tangents);
@@ -122,15 +123,16 @@ void check_beside(const Scene& scene, std::size_t directions) {
   Scene by_normals = scene;
   for (Instance& entry : by_normals.meshes)
     if (!entry.instance_of) entry.mesh = normals_as_colors(entry.mesh);
-  check_same(normals, frames_of(by_normals, false).first, 1e-6);
-  check_same(colors, frames_of(scene, false).first, 1e-6);
+  check_same(normals, frames_of(by_normals, false).first);
+  check_same(colors, frames_of(scene, false).first);
 }
 
 }  // namespace
 
 TEST_SUITE("tangents") {
   TEST_CASE("normals beside colours are what they would be as colours") {
-    Mesh ball = make_icosphere(is_reduced() ? 1 : 2), box = make_cube();
+    // Edges too short for corners (kernels/contour.cl): those of a silhouette take account of seams that end there.
+    Mesh ball = make_icosphere(2), box = make_cube();
     box.face_colors.assign(box.faces.size(), glm::vec3(0.3F, 0.5F, 0.8F));  // jump nowhere
     give_normals(ball, glm::dmat3(1), CornerNormals::smooth);
     give_normals(box, glm::dmat3(1), CornerNormals::parted);
@@ -139,10 +141,11 @@ TEST_SUITE("tangents") {
       CAPTURE(preset);
       for (const bool is_textured : {false, true}) {
         CAPTURE(is_textured);
+        if (is_reduced() && !is_textured) continue;
         Scene smoothed = is_textured ? textured(scene) : scene;
         smoothed.smoothing = smoothing_preset(preset);
         check_beside(smoothed, 3);
-        if (!is_textured && !is_reduced()) check_beside(smoothed, 18);
+        if (!is_textured) check_beside(smoothed, 18);
       }
     }
   }
