@@ -269,8 +269,6 @@ void Renderer::Impl::shade_and_aggregate() {
   }
   if (!pixel_noise) return;
   pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
-  if (shown_normals)
-    shown_normals->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, front_layers());
   pixel_noise->unblend();
 }
 

@@ -59,7 +59,7 @@ void Renderer::Impl::shade_normals() {
 void Renderer::Impl::blend_normals() {
   const shared::FrameParams p = about_normals(frame);
   ShownNormals& n = *shown_normals;
-  n.antialias.cross(with_frame(contour_inputs(), p), pixel_noise->contour);
+  n.antialias.cross(with_frame(contour_inputs(), p), pixel_noise->contour, pixel_noise->antialias);
   n.antialias.forward(p, pixel_noise->contour, n.raster, n.kept);
   pixel_noise->blur_forward(image_size(), n.raster, n.smoothed, false);
 }

@@ -47,7 +47,8 @@ TileLaunch Antialias::launch_around(const shared::FrameParams& p, const std::opt
   return {p, with_rows_around(p, wanted.value_or(window_of(p)), around), row_items(device_)};
 }
 
-void Antialias::cross(const ContourInputs& in, const Contour& contour, const std::optional<Range>& wanted) {
+void Antialias::cross(const ContourInputs& in, const Contour& contour, const Antialias& fronts,
+                      const std::optional<Range>& wanted) {
   winner.resize(device_, 2 * pixels_of(in.p));
   cut.resize(device_, 2 * pixels_of(in.p));
   const std::size_t tiles = window_of(in.p).count * in.p.tiles_x;
@@ -64,7 +65,7 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, const std
                                                  .clipped = in.clipped,
                                                  .tile_starts = contour.tile_starts,
                                                  .pair_contour = contour.pair_contour,
-                                                 .front = front,
+                                                 .front = fronts.front,
                                                  .winner = winner,
                                                  .cut = cut,
                                                  .crowded = crowded_});
@@ -76,8 +77,8 @@ void Antialias::cross(const ContourInputs& in, const Contour& contour, const std
                                                       .clipped = in.clipped,
                                                       .tile_starts = contour.tile_starts,
                                                       .pair_contour = contour.pair_contour,
-                                                      .front = front,
-                                                      .front_face = front_face,
+                                                      .front = fronts.front,
+                                                      .front_face = fronts.front_face,
                                                       .winner = winner,
                                                       .crowded = crowded_,
                                                       .counts = second_counts,

@@ -41,7 +41,12 @@ class Antialias {
   /// Finds what crosses the steps between samples; after find_front() of the window. Surfaces p.depth_reach
   /// (normalised depth) behind the nearest count as seen. `wanted`, here and below: the rows of tiles whose results
   /// are, k_rows_around less than the window where the view goes on; or all of the window.
-  void cross(const ContourInputs& in, const Contour& contour, const std::optional<Range>& wanted = {});
+  void cross(const ContourInputs& in, const Contour& contour, const std::optional<Range>& wanted = {}) {
+    cross(in, contour, *this, wanted);
+  }
+  /// The same, by what another's find_front() has found.
+  void cross(const ContourInputs& in, const Contour& contour, const Antialias& fronts,
+             const std::optional<Range>& wanted = {});
   /// Blends the samples in place.
   void forward(const shared::FrameParams& p, const Contour& contour, Buffer<cl_float4>& samples,
                KeptSamples& kept, const std::optional<Range>& wanted = {});
