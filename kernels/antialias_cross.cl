@@ -171,11 +171,8 @@ static inline Cut gradient_of_cut(uint contour, uint step, uint list, global con
                                   global const SecondCrossing* restrict seconds,
                                   global const float2* restrict grad_seconds) {
   if (winner[step] == contour) return grad_cut[step];
-  const uint first = DPR_SECOND_ROOM * list, last = first + second_counts[list];
-  for (uint k = first; k < last; ++k) {
-    if (seconds[k].step == step && seconds[k].contour == contour) return grad_seconds[k];
-  }
-  return (Cut)(0.0f);
+  const uint place = place_of_second(contour, step, list, second_counts, seconds);
+  return place != DPR_NO_CROSSING ? grad_seconds[place] : (Cut)(0.0f);
 }
 
 /// The gradients of the ends of contours: each walks its own crossings again, and takes those of the steps

@@ -50,22 +50,6 @@ static inline int is_second_hidden(const FrameParams p, const CrossingScene v, c
          !have_end_in_common(winner, c);
 }
 
-/// False only if none of the tile's steps where an edge may cross a line has another contour for its winner.
-static inline int may_be_second(const FrameParams p, uint view, uint contour, const RasterEdge e, int line,
-                                const TileSamples s, global const uint* restrict winner) {
-  const int low = e.is_by_rows ? s.first_column : s.first_row,
-            high = e.is_by_rows ? s.last_column : s.last_row;
-  const int middle = (int)floor(clamp(position_on_line(p, e, line), (float)(low - 2), (float)(high + 2)));
-  Crossing x = {1, line, line, line, 0.0f, 0.0f, 0.0f};
-  for (int first = max(middle - 1, low); first < min(middle + 2, high); ++first) {
-    x.column = e.is_by_rows ? first : line;
-    x.row = e.is_by_rows ? line : first;
-    const uint other = winner[step_of(p, view, e, x)];
-    if (is_contour(other) && other != contour) return 1;
-  }
-  return 0;
-}
-
 /// Lists the seconds of a tile, as many as there is room for. One work-item, with a list of its own, per
 /// DPR_ROWS rows, and as many columns, of a tile. Deterministic. Inputs as antialias_cross has and leaves
 /// them, and
@@ -91,7 +75,7 @@ kernel void antialias_second_find(const FrameParams p, global const ViewParams* 
   const CrossingScene v = {faces, ndc, front, place_of_sample(p, view, 0, 0),
                            p.depth_reach / views[view].inverse_range};
   uint count = 0;
-  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1]; ++pair) {
+  for (uint pair = tile_starts[tile]; pair < tile_starts[tile + 1] && count < DPR_SECOND_ROOM; ++pair) {
     const uint contour = pair_contour[pair];
     if (is_left_out(p, contour)) continue;
     const TileContour c = load_contour(p, contour, edges, faces, ndc, clipped);
@@ -101,7 +85,6 @@ kernel void antialias_second_find(const FrameParams p, global const ViewParams* 
       const RasterEdge e = raster_edge(c.a, c.b, by_rows);
       const int2 lines = own_lines_of_edge(p, e, s, own);
       for (int line = lines.x; line < lines.y && found < DPR_SECOND_ROOM; ++line) {
-        if (!may_be_second(p, view, contour, e, line, s, winner)) continue;
         const Crossing x = cross_line(p, e, line);
         if (!is_step_of(p, e, x, s)) continue;
         const uint step = step_of(p, view, e, x), first = winner[step];
@@ -158,9 +141,9 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
                                      global const uint* restrict winner, global const float2* restrict cut,
                                      global const float4* restrict raster, global float4* restrict blended) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
-  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   const Steps steps = {winner, cut, samples_of_window(p)};
-  const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
+  const NearTiles tiles = tiles_of_steps(p, rows.tile);
   for (uint i = 0; i < near_lists(tiles); ++i) {
     const uint list = near_list(p, tiles, i);
     for (uint k = 0; k < counts[list]; ++k) {
@@ -213,18 +196,23 @@ kernel void antialias_second_backward(const FrameParams p, global const uint* re
       const uint place = DPR_SECOND_ROOM * list + k;
       const SecondCrossing c = seconds[place];
       const uint2 samples = ends_of_step(p, c.step);
+      const int is_own = is_in_rows(p, rows, samples.x), is_by_step = c.reference >= DPR_SAMPLE_PAIRS;
+      const uint2 of_jump =
+          is_by_step ? ends_of_step(p, place_of_reference(c.reference)) : reference_samples(p, c);
+      const int has_step = is_by_step && is_near_rows(p, rows, of_jump.x),
+                has_before = !is_by_step && is_in_rows(p, rows, of_jump.x),
+                has_behind = !is_by_step && is_in_rows(p, rows, of_jump.y);
+      if (!is_own && !has_step && !has_before && !has_behind) continue;
       const float4 first = grad_blended[samples.x], second = grad_blended[samples.y];
       const float2 parts = parts_gained(c, cut[c.step]);
       const float4 grad_jump = parts.x * first + parts.y * second;
-      if (c.reference >= DPR_SAMPLE_PAIRS) {
+      if (has_step) {
         add_to_reference(p, steps, rows, load_reference(p, steps, c.reference), grad_jump, raster, grad_cut,
                          grad_raster);
-      } else {
-        const uint2 of_jump = reference_samples(p, c);
-        if (is_in_rows(p, rows, of_jump.y)) grad_raster[of_jump.y] += grad_jump;
-        if (is_in_rows(p, rows, of_jump.x)) grad_raster[of_jump.x] -= grad_jump;
       }
-      if (!is_in_rows(p, rows, samples.x)) continue;
+      if (has_behind) grad_raster[of_jump.y] += grad_jump;
+      if (has_before) grad_raster[of_jump.x] -= grad_jump;
+      if (!is_own) continue;
       const float4 jump = jump_of(p, steps, c, raster);
       const float of_first = dot(first, jump), of_second = dot(second, jump);
       grad_cut[c.step] -= gradient_by_parts(cut[c.step], of_first, of_second);

@@ -87,16 +87,12 @@ kernel void antialias_cross_tangent(
       if (!is_step_of(p, e, x, s)) continue;
       const uint step = step_of(p, c.view, e, x);
       size_t place = moved_step(directions, step);
-      int is_listed = winner[step] == contour;
-      if (!is_listed) {
+      if (winner[step] != contour) {
         const uint list = list_of_line(p, pair_tile[pair], line);
-        const uint first = DPR_SECOND_ROOM * list, last = first + second_counts[list];
-        for (uint k = first; k < last && !is_listed; ++k) {
-          is_listed = seconds[k].step == step && seconds[k].contour == contour;
-          if (is_listed) place = moved_second(p, directions, k);
-        }
+        const uint second = place_of_second(contour, step, list, second_counts, seconds);
+        if (second == DPR_NO_CROSSING) continue;
+        place = moved_second(p, directions, second);
       }
-      if (!is_listed) continue;
       const CutByEnds by = cut_by_ends(p, c, e, x);
       for (uint d = 0; d < directions; ++d) {
         const float2 move_a = ends.first[0][d * ends.stride[0]].xy,
@@ -268,9 +264,9 @@ kernel void antialias_second_tangent(
     global const float4* restrict raster, global const float2* restrict cut_tangents,
     global const float4* restrict faded_tangents, global float4* restrict tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
-  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, DPR_NEAR_TILES, tile_starts)) return;
+  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
   const Steps steps = {winner, cut, samples_of_window(p)};
-  const NearTiles tiles = near_tiles(p, rows.tile, DPR_NEAR_TILES);
+  const NearTiles tiles = tiles_of_steps(p, rows.tile);
   for (uint i = 0; i < near_lists(tiles); ++i) {
     const uint list = near_list(p, tiles, i);
     for (uint k = 0; k < counts[list]; ++k) {

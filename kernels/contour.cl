@@ -38,6 +38,20 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
   return !(fabs(side) > (half_extent + DPR_CROSSING_SLACK) * (fabs(e.d.x) + fabs(e.d.y)));
 }
 
+/// The shortest contour whose ends' corners count, in samples: a line crosses it wherever it lies. Shorter
+/// ones miss lines, and what their ends would add to those, so no end of theirs counts, nor that of another
+/// in the same vertex.
+#define DPR_LEAST_CORNERED 2.5f
+
+/// Beside the flags of a contour's number in its kind: it is that long.
+#define DPR_CONTOUR_LONG DPR_CONTOUR_FLAGS
+
+static inline int is_long_edge(const FrameParams p, const ViewEdge e) {
+  const float2 d = e.end[1].xy - e.end[0].xy;
+  const float least = DPR_LEAST_CORNERED * p.pixel_size;
+  return dot(d, d) >= least * least;
+}
+
 /// Counts the tiles of every contour. One work-item per (view, edge).
 /// in   edges        uint2[edge]           of the scene, or of every view; see DPR_EDGE_FLAG
 /// in   facing       uchar[view][face]     as setup and clipping leave it
@@ -47,7 +61,7 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// in   normal_faces, normals  uint4[face], float4[normal]  read where p.shading is DPR_BESIDE_NORMALS
 /// out  counts       uint[view][edge]
-/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, _ONE, _LEFT. Not written of others
+/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, _ONE, _LEFT, _LONG. Not written of others
 kernel void contour_count(const FrameParams p, global const uint2* restrict edges,
                           global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
@@ -70,7 +84,8 @@ kernel void contour_count(const FrameParams p, global const uint2* restrict edge
                         : kind == DPR_CREASE_OF_COLORS  ? DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE
                         : kind == DPR_CREASE_OF_NORMALS ? DPR_CONTOUR_ONE
                                                         : 0;
-    kinds[i] = (uchar)(crease | (is_left ? DPR_CONTOUR_LEFT : 0));
+    kinds[i] =
+        (uchar)(crease | (is_left ? DPR_CONTOUR_LEFT : 0) | (is_long_edge(p, edge) ? DPR_CONTOUR_LONG : 0));
     const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
     for (uint row = t.rows.x; row <= t.rows.y; ++row) {
       for (uint column = t.columns.x; column <= t.columns.y; ++column)
@@ -80,26 +95,18 @@ kernel void contour_count(const FrameParams p, global const uint2* restrict edge
   counts[i] = count;
 }
 
-/// The shortest contour whose ends' corners count, in samples: a line crosses it wherever it lies. Shorter
-/// ones miss lines, and what their ends would add to those, so no end of theirs counts, nor that of another
-/// in the same vertex.
-#define DPR_LEAST_CORNERED 2.5f
-
 /// The contours of a view.
 typedef struct {
   EdgeScene edges;
   global const uint* face_edges;               // see DPR_FACE_SIDES
   global const uint *corner_starts, *corners;  // face * 3 + corner, by vertex
   global const uint* offsets;                  // of the view's edges: equal where an edge is no contour
+  global const uchar* kinds;                   // of the view's edges
 } Contours;
 
-/// True if an edge that is a contour is that long.
-static inline int is_long(const FrameParams p, const Contours c, uint edge) {
-  if (c.offsets[edge] == c.offsets[edge + 1]) return 1;
-  const ViewEdge e = view_edge(c.edges, edge);
-  const float2 d = e.end[1].xy - e.end[0].xy;
-  const float least = DPR_LEAST_CORNERED * p.pixel_size;
-  return dot(d, d) >= least * least;
+/// False only if an edge is a contour, and a short one.
+static inline int is_long(const Contours c, uint edge) {
+  return c.offsets[edge] == c.offsets[edge + 1] || (c.kinds[edge] & DPR_CONTOUR_LONG);
 }
 
 /// The edge of a face between two of its vertices.
@@ -115,19 +122,19 @@ static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
 }
 
 /// True if all contours that end in a vertex are that long.
-static inline int are_long(const FrameParams p, const Contours c, uint vertex) {
+static inline int are_long(const Contours c, uint vertex) {
   for (uint k = 2 * c.corner_starts[vertex]; k < 2 * c.corner_starts[vertex + 1]; ++k) {
     const uint edge = edge_at(c.face_edges, c.corners[k / 2], k % 2);
-    if (edge != DPR_NO_MESH_EDGE && !is_long(p, c, edge)) return 0;
+    if (edge != DPR_NO_MESH_EDGE && !is_long(c, edge)) return 0;
   }
   return 1;
 }
 
 /// True if all contours that end in the end of an edge are that long: those of its vertex; or, on the near
 /// plane, the edge that is cut there, and the cuts of its faces.
-static inline int has_corner(const FrameParams p, const Contours c, uint edge, const ViewEdge e, uint end) {
+static inline int has_corner(const Contours c, uint edge, const ViewEdge e, uint end) {
   const uint mesh_edges = c.edges.mesh_edges, cut = end == 0 ? e.cut[0] : e.cut[1];
-  if (cut == DPR_NO_CUT) return are_long(p, c, end == 0 ? e.record.x : e.record.y);
+  if (cut == DPR_NO_CUT) return are_long(c, end == 0 ? e.record.x : e.record.y);
   if (edge >= mesh_edges) {
     const ClippedFace of = c.edges.clipped[e.cut_face];
     global const uint4* const face = c.edges.faces + e.cut_face;
@@ -136,8 +143,8 @@ static inline int has_corner(const FrameParams p, const Contours c, uint edge, c
     if (edge == DPR_NO_MESH_EDGE) return 0;
   }
   const uint4 record = record_of(c.edges.edges[edge], c.edges.faces);
-  return is_long(p, c, edge) && is_long(p, c, mesh_edges + own_face(record)) &&
-         (!has_other_face(record) || is_long(p, c, mesh_edges + other_face(record)));
+  return is_long(c, edge) && is_long(c, mesh_edges + own_face(record)) &&
+         (!has_other_face(record) || is_long(c, mesh_edges + other_face(record)));
 }
 
 /// Lists the tiles of every contour, each at a place of its own. One work-item per (view, edge), or one where
@@ -164,11 +171,12 @@ kernel void contour_fill(const FrameParams p, const uint capacity, global const 
   const EdgeScene s = edges_of_view(p, view, edges, faces, ndc, clipped);
   const uint first_edge = view * p.edges;
   const ViewEdge edge = view_edge(s, i - first_edge);
-  uint contour = DPR_CONTOUR_FLAGS * i + kinds[i];
-  const Contours contours = {s, face_edges, starts_of_view(p, view, p.vertices, corner_starts), corners,
-                             offsets + first_edge};
-  if (has_corner(p, contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
-  if (has_corner(p, contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
+  uint contour = DPR_CONTOUR_FLAGS * i + kinds[i] % DPR_CONTOUR_FLAGS;
+  const Contours contours = {
+      s,       face_edges,           starts_of_view(p, view, p.vertices, corner_starts),
+      corners, offsets + first_edge, kinds + first_edge};
+  if (has_corner(contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
+  if (has_corner(contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
   const uint first_tile = view * p.tiles_x * p.tiles_y;
   uint place = offsets[i];
@@ -216,6 +224,7 @@ kernel void contour_gather(const FrameParams p, global const uint* restrict pair
       const uint edge = edge_at(face_edges, corners[k / 2], k % 2);
       if (edge == DPR_NO_MESH_EDGE || starts[edge] == starts[edge + 1]) continue;
       first = min(first, edge);
+      if (first < own) break;
       for (uint place = starts[edge]; place < starts[edge + 1]; ++place) {
         const float4 grad = grad_ends[edge_pairs[place]];
         sum += k % 2 ? grad.zw : grad.xy;

@@ -66,7 +66,7 @@ static inline float weight_of_slope_gradient(float slope2) {
 
 /// A crossing of an edge with a line of samples, a row or a column.
 typedef struct {
-  int exists;
+  int exists;  // 0: nothing else is set
   int line;
   int column, row;  // of the step's first sample
   float position;   // on the line, in samples
@@ -84,9 +84,14 @@ static inline int is_behind(const RasterEdge e, float2 sample) {
 
 /// True if a point does not lie behind a line. One on the line belongs to its upper or right side, so that a
 /// chain of edges crosses it once.
-static inline int is_before_line(const FrameParams p, const RasterEdge e, float2 point, int line) {
+static inline int is_before_line(const FrameParams p, int is_by_rows, float2 point, int line) {
   const float2 at = pixel_centre(p, line, line);
-  return e.is_by_rows ? point.y >= at.y : point.x <= at.x;
+  return is_by_rows ? point.y >= at.y : point.x <= at.x;
+}
+
+/// True if an edge between two points crosses a line.
+static inline int crosses_line(const FrameParams p, float2 a, float2 b, int is_by_rows, int line) {
+  return is_before_line(p, is_by_rows, a, line) != is_before_line(p, is_by_rows, b, line);
 }
 
 /// Position at which the edge's line crosses a line of samples, in samples along it.
@@ -106,23 +111,22 @@ static inline float along_edge(const FrameParams p, const RasterEdge e, int line
 /// Crossing of an edge and a line. The step's samples lie on different sides of the edge, as the
 /// triangles have them.
 static inline Crossing cross_line(const FrameParams p, const RasterEdge e, int line) {
-  Crossing c;
-  c.exists = is_before_line(p, e, e.a, line) != is_before_line(p, e, e.b, line);
+  Crossing c = {0, 0, 0, 0, 0.0f, 0.0f, 0.0f};
+  if (!crosses_line(p, e.a, e.b, e.is_by_rows, line)) return c;
+  c.exists = 1;
   c.line = line;
   c.position = position_on_line(p, e, line);
   c.along = along_edge(p, e, line);
   const float size = (float)(e.is_by_rows ? p.width : p.height);
-  int first = (int)floor(clamp(c.position, -2.0f, size));
-  if (c.exists) {
-    // The first sample behind the edge, of those around the position, ends the step.
-    int sample = first;
+  const int nearest = (int)floor(clamp(c.position, -2.0f, size));
+  // The first sample behind the edge, of those around the position, ends the step.
+  int sample = nearest;
 #pragma unroll 1
-    while (sample < first + 2 &&
-           !is_behind(e, e.is_by_rows ? pixel_centre(p, sample, line) : pixel_centre(p, line, sample))) {
-      ++sample;
-    }
-    first = sample - 1;
+  while (sample < nearest + 2 &&
+         !is_behind(e, e.is_by_rows ? pixel_centre(p, sample, line) : pixel_centre(p, line, sample))) {
+    ++sample;
   }
+  const int first = sample - 1;
   c.column = e.is_by_rows ? first : line;
   c.row = e.is_by_rows ? line : first;
   c.t = clamp(c.position - (float)first, 0.0f, 1.0f);
@@ -140,9 +144,9 @@ typedef struct {
 
 /// 0 where the edge goes on to the next line on that side.
 static inline CornerArea corner_area(const FrameParams p, const RasterEdge e, const Crossing x, float2 end) {
-  const int is_before = is_before_line(p, e, end, x.line), towards_end = is_before ? -1 : 1;
+  const int is_before = is_before_line(p, e.is_by_rows, end, x.line), towards_end = is_before ? -1 : 1;
   CornerArea c = {0.0f, 0.0f, 0.0f, 0.0f};
-  if (is_before_line(p, e, end, x.line + towards_end) == is_before) return c;
+  if (is_before_line(p, e.is_by_rows, end, x.line + towards_end) == is_before) return c;
   const float column = column_at(p, end.x), row = row_at(p, end.y);
   const float across = e.is_by_rows ? row : column, position = e.is_by_rows ? column : row;
   const float half_step = 0.5f * (float)towards_end, lines = e.is_by_rows ? -p.pixel_size : p.pixel_size;

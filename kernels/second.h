@@ -15,10 +15,26 @@ static inline uint2 reference_samples(const FrameParams p, const SecondCrossing 
   return (uint2)(within_reach(p, first, c.reference % pairs), within_reach(p, first, c.reference / pairs));
 }
 
+/// True if a place is that of one of the rows' samples. What lies to the left of them counts as the end of the line
+/// above, and is none.
 static inline int is_in_rows(const FrameParams p, const TileRows rows, uint sample) {
-  const uint line = line_of_place(p, sample), row = line % p.height;
-  return tile_of_sample(p, line / p.height, (sample + p.first_sample) % p.width, row) == rows.tile &&
-         row >= rows.first && row < rows.last;
+  const uint from_first = sample - place_of_sample(p, rows.view, rows.first_column, rows.first);
+  return from_first < (rows.last - rows.first) * p.width && from_first % p.width < rows.columns;
+}
+
+/// False only if a place is more than two samples away from the rows, along lines or across.
+static inline int is_near_rows(const FrameParams p, const TileRows rows, uint sample) {
+  const uint from_first =
+      sample - place_of_sample(p, rows.view, rows.first_column, rows.first) + 2 * (p.width + 1);
+  return from_first < (rows.last - rows.first + 5) * p.width && from_first % p.width < rows.columns + 4;
+}
+
+/// The tiles from whose steps a sample of one is reached: itself, those to the left and above.
+static inline NearTiles tiles_of_steps(const FrameParams p, uint tile) {
+  const uint in_view = tile % (p.tiles_x * p.tiles_y), left = in_view % p.tiles_x > 0 ? 1 : 0,
+             above = in_view >= p.tiles_x ? 1 : 0;
+  const NearTiles tiles = {tile - left - above * p.tiles_x, 1 + left, 1 + above};
+  return tiles;
 }
 
 /// The lists of the tiles near one, in a fixed order.
@@ -47,10 +63,13 @@ typedef struct {
   float way_first, way_second;
 } Reference;
 
+/// Of a reference to a step.
+static inline uint place_of_reference(uint reference) { return (reference - DPR_SAMPLE_PAIRS) & ~DPR_TURNED; }
+
 static inline Reference load_reference(const FrameParams p, const Steps steps, uint reference) {
   Reference r;
   const uint turned_step = reference - DPR_SAMPLE_PAIRS;
-  r.place = turned_step & ~DPR_TURNED;
+  r.place = place_of_reference(reference);
   const uint2 ends = ends_of_step(p, r.place);
   const float t = 0.5f + steps.cut[r.place].x;
   const int is_turned = (turned_step & DPR_TURNED) != 0, ahead = r.place < steps.pixels ? 0 : 1;

@@ -17,7 +17,7 @@
 #define DPR_TURNED 0x80000000u
 
 static inline int lies_on_raster(const FrameParams p, const RasterEdge e, const Crossing x) {
-  return x.exists && x.column >= 0 && x.row >= 0 && x.column + e.is_by_rows < (int)p.width &&
+  return x.column >= 0 && x.row >= 0 && x.column + e.is_by_rows < (int)p.width &&
          x.row + !e.is_by_rows < (int)p.height;
 }
 
@@ -36,6 +36,7 @@ static inline uint tile_of_sample(const FrameParams p, uint view, uint column, u
 static inline uint own_step(const FrameParams p, uint view, uint contour, const TileContour c, int by_rows,
                             int line, int first_is_within, global const uint* restrict winner,
                             global const uchar* restrict crowded) {
+  if (!crosses_line(p, c.a, c.b, by_rows, line)) return DPR_NO_CROSSING;
   const RasterEdge e = raster_edge(c.a, c.b, by_rows);
   const Crossing x = cross_line(p, e, line);
   if (!lies_on_raster(p, e, x)) return DPR_NO_CROSSING;
@@ -54,27 +55,36 @@ static inline uint own_step(const FrameParams p, uint view, uint contour, const 
 /// of the step; from it on they are steps.
 #define DPR_SAMPLE_PAIRS (DPR_FACE_SPAN * DPR_FACE_SPAN * DPR_FACE_SPAN * DPR_FACE_SPAN)
 
+/// True if one of a row's faces is one of two.
+static inline int has_either(uint8 faces, uint a, uint b) { return any(faces == a || faces == b); }
+
 /// The samples nearest to a crossing that show the faces before and behind it, as a reference;
 /// DPR_NO_CROSSING if none shows one of them.
 static inline uint find_samples(const FrameParams p, uint view, uint before, uint behind, const RasterEdge e,
                                 const Crossing x, global const uint* restrict front_face) {
   const float2 at = e.is_by_rows ? (float2)(x.position, (float)x.line) : (float2)((float)x.line, x.position);
+  const int first_column = x.column - DPR_FACE_REACH, first_row = x.row - DPR_FACE_REACH;
+  const int columns_begin = max(first_column, 0),
+            columns_end = min(first_column + DPR_FACE_SPAN, (int)p.width);
   float least_before = INFINITY, least_behind = INFINITY;
   uint found_before = 0, found_behind = 0;
+  for (int row = max(first_row, 0); row < min(first_row + DPR_FACE_SPAN, (int)p.height); ++row) {
+    global const uint* const shown = front_face + place_of_sample(p, view, (uint)columns_begin, (uint)row);
+    if (columns_end - columns_begin == DPR_FACE_SPAN && !has_either(vload8(0, shown), before, behind))
+      continue;
 #pragma unroll 1
-  for (uint k = 0; k < DPR_FACE_SPAN * DPR_FACE_SPAN; ++k) {
-    const int column = x.column - DPR_FACE_REACH + (int)(k % DPR_FACE_SPAN),
-              row = x.row - DPR_FACE_REACH + (int)(k / DPR_FACE_SPAN);
-    if (column < 0 || row < 0 || column >= (int)p.width || row >= (int)p.height) continue;
-    const uint face = front_face[place_of_sample(p, view, (uint)column, (uint)row)];
-    const float2 away = (float2)((float)column, (float)row) - at;
-    const float distance2 = dot(away, away);
-    if (face == before && distance2 < least_before) {
-      least_before = distance2;
-      found_before = k;
-    } else if (face == behind && distance2 < least_behind) {
-      least_behind = distance2;
-      found_behind = k;
+    for (int column = columns_begin; column < columns_end; ++column) {
+      const uint face = shown[column - columns_begin];
+      const float2 away = (float2)((float)column, (float)row) - at;
+      const float distance2 = dot(away, away);
+      const uint k = (uint)(column - first_column + DPR_FACE_SPAN * (row - first_row));
+      if (face == before && distance2 < least_before) {
+        least_before = distance2;
+        found_before = k;
+      } else if (face == behind && distance2 < least_behind) {
+        least_behind = distance2;
+        found_behind = k;
+      }
     }
   }
   return fmax(least_before, least_behind) < INFINITY

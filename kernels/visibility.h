@@ -128,6 +128,24 @@ static inline uint step_of(const FrameParams p, uint view, const RasterEdge e, c
   return (e.is_by_rows ? 0 : samples_of_window(p)) + place_of_sample(p, view, (uint)x.column, (uint)x.row);
 }
 
+/// The place of a contour's crossing of a step among the seconds of a list, which ascend by their contours;
+/// DPR_NO_CROSSING where it is none of them.
+static inline uint place_of_second(uint contour, uint step, uint list, global const uint* restrict counts,
+                                   global const SecondCrossing* restrict seconds) {
+  const uint last = DPR_SECOND_ROOM * list + counts[list];
+  uint first = DPR_SECOND_ROOM * list;
+  for (uint count = counts[list]; count > 0; count /= 2) {
+    const uint middle = first + count / 2;
+    if (seconds[middle].contour >= contour) continue;
+    first = middle + 1;
+    --count;
+  }
+  for (; first < last && seconds[first].contour == contour; ++first) {
+    if (seconds[first].step == step) return first;
+  }
+  return DPR_NO_CROSSING;
+}
+
 /// Bytes that hold a bit for every step of a tile: one a row, for the steps along it, then one a column.
 #define DPR_TILE_BYTES (2 * DPR_TILE)
 
