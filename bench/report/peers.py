@@ -48,13 +48,15 @@ def icosphere(subdivisions):
     near = np.abs(np.linalg.norm(points[:, None] - points, axis=2) - edge) < 1e-6
     faces = np.array([(a, b, c) for a in range(12) for b in range(a) for c in range(b)
                       if near[a, b] and near[b, c] and near[a, c]])
+    # In the order of the C++ row's mesh: a face's parts follow each other, vertices their first face.
     for _ in range(subdivisions):
-        edges, index = np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0,
-                                 return_inverse=True)
-        middle = points[edges].sum(axis=1)
-        ab, bc, ca = (index.reshape(-1, 3) + len(points)).T
+        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, first, index = np.unique(sides, axis=0, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        middle = points[edges[order]].sum(axis=1)
+        ab, bc, ca = (np.argsort(order)[index.ravel()].reshape(-1, 3) + len(points)).T
         a, b, c = faces.T
-        faces = np.concatenate([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+        faces = np.stack([np.stack(t, 1) for t in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))], 1).reshape(-1, 3)
         points = np.concatenate([points, middle / np.linalg.norm(middle, axis=1, keepdims=True)])
     return points, faces
 
