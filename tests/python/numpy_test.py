@@ -162,6 +162,11 @@ class NumpyTest(unittest.TestCase):
         for wrong in ({"image": image[0]}, {"face_id": image[..., 0]}, {"colour": image}):
             with self.assertRaisesRegex(ValueError, "gradient"):
                 pullback(**wrong)
+        for wrong in ((image, outputs), 1.0, "image"):  # the first as JAX has it
+            with self.assertRaisesRegex(TypeError, "gradient of image .* expected an array; those of outputs by their names"):
+                pullback(wrong)
+        np.testing.assert_array_equal(pullback(np.ones_like(image).tolist())["vertices"],
+                                      pullback(np.ones_like(image))["vertices"])
         for name in ("colors", "faces"):
             with self.assertRaisesRegex(ValueError, f"wrt .* got '{name}', expected names of given arrays"):
                 dpr.render_with_vjp(SQUARE, SQUARE_FACES, views, intrinsics, width=SIZE, height=SIZE, wrt=[name])

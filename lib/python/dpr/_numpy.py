@@ -93,11 +93,15 @@ def vjp(spec, plan, wrt):
         for name in outputs:
             if name not in spec.outputs or name not in _frames.WITH_GRADIENTS:
                 _arrays.fail(ValueError, "gradient", repr(name), "image, or outputs of this call that have gradients")
-        grads = [image, *(outputs.get(name) for name in spec.outputs)]
-        for (shape, _), grad in zip(_frames.shapes_of(spec, rendered.outputs[0].shape[0]), grads):
+        grads = []
+        for name, (shape, _) in zip(["image", *spec.outputs], _frames.shapes_of(spec, rendered.outputs[0].shape[0])):
+            grad = _arrays.from_numbers(image if name == "image" else outputs.get(name))
+            if grad is not None and not _arrays.is_array(grad):
+                _arrays.fail(TypeError, f"gradient of {name}", type(grad).__name__, "an array; those of outputs by their names")
             if grad is not None and tuple(grad.shape) != shape:
-                _arrays.fail(ValueError, "gradient", list(grad.shape), list(shape))
-        found = rendered.gradients([grad if grad is None else _arrays.to_numpy(grad) for grad in grads])
+                _arrays.fail(ValueError, f"gradient of {name}", list(grad.shape), list(shape))
+            grads.append(grad if grad is None else _arrays.to_numpy(grad))
+        found = rendered.gradients(grads)
         for leaf, slope in plan.slopes.items():
             if leaf in found:
                 found[leaf] = np.asarray(found[leaf] * slope(), np.float32)
