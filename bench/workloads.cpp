@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
+#include <utility>
 
 #include "dpr/error.hpp"
 #include "dpr/mesh.hpp"
@@ -12,8 +13,9 @@ namespace {
 
 constexpr std::uint32_t k_exact = 0;  // in a list of sample counts
 
-/// Additions to the scene's mesh. inside: the camera is inside, so that faces cross the near plane.
-enum class Scenery { plain, inside, textured, lit };
+/// Changes to the scene's mesh. inside: the camera is inside, so that faces cross the near plane. facets: every face has
+/// a colour of its own, so that every edge in sight is a contour.
+enum class Scenery { plain, inside, textured, lit, facets };
 
 struct Definition {
   std::string_view name;
@@ -65,6 +67,7 @@ const std::vector<Definition>& definitions() {
         {"lit256", 3, 256, 1e-4F, 1e-3F, {k_exact}, false, true, 1, k_pixel_sigma, Scenery::lit},
         {"views24", 3, 128, 1e-4F, 1e-3F, {k_exact, 8, 32}, true, true, 24},
         {"sphere20k", 5, 256, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
+        {"facets20k", 5, 256, 1e-4F, 1e-3F, {}, false, true, 1, k_pixel_sigma, Scenery::facets},
         {"sphere80k", 6, 512, 1e-4F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma},
         {"million", 8, 1024, 1e-6F, 1e-3F, {k_exact, 8}, false, true, 1, k_pixel_sigma}};
     add_sweeps(list);
@@ -121,6 +124,11 @@ Scene make_scene(const Definition& d) {
   } else if (d.scenery == Scenery::lit) {
     scene.lights = make_lights();
     scene.gradients.lights = true;
+  } else if (d.scenery == Scenery::facets) {
+    Mesh& mesh = scene.meshes[0].mesh;
+    const std::vector<glm::vec3> colors = std::exchange(mesh.vertex_colors, {});
+    for (const glm::uvec3& f : mesh.faces)
+      mesh.face_colors.push_back((colors[f.x] + colors[f.y] + colors[f.z]) / 3.0F);
   }
   scene.smoothing.sigma = d.sigma;
   scene.smoothing.gamma = d.gamma;
@@ -220,6 +228,7 @@ std::string_view describe(std::string_view name) {
       {"lit256", "sphere256 with a point light, a directional one and harmonics, Phong; exact"},
       {"views24", "sphere128 from 24 cameras in one batch"},
       {"sphere20k", "20,480 triangles, 256x256; exact, M = 8"},
+      {"facets20k", "sphere20k with colours of faces; exact"},
       {"sphere80k", "81,920 triangles, 512x512; exact, M = 8"},
       {"million", "1,310,720 triangles, 1024x1024; exact, M = 8"},
       {"sweep-triangles", "spheres of 80 to 327,680 triangles, 256x256, exact"},

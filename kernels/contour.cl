@@ -43,13 +43,20 @@ static inline int line_meets_tile(const TiledEdge e, uint column, uint row) {
 /// in the same vertex.
 #define DPR_LEAST_CORNERED 2.5f
 
-/// Beside the flags of a contour's number in its kind: it is that long.
-#define DPR_CONTOUR_LONG DPR_CONTOUR_FLAGS
+/// Beside the flags of a contour's number in its kind: it is shorter.
+#define DPR_CONTOUR_SHORT DPR_CONTOUR_FLAGS
 
-static inline int is_long_edge(const FrameParams p, const ViewEdge e) {
+static inline int is_short(const FrameParams p, const ViewEdge e) {
   const float2 d = e.end[1].xy - e.end[0].xy;
   const float least = DPR_LEAST_CORNERED * p.pixel_size;
-  return dot(d, d) >= least * least;
+  return dot(d, d) < least * least;
+}
+
+/// False only if an edge lies between two lines of samples, along both axes: then it crosses no step.
+static inline int may_cross_line(const TiledEdge e) {
+  const float2 low = fmin(e.a, e.a + e.d) - DPR_CROSSING_SLACK,
+               high = fmax(e.a, e.a + e.d) + DPR_CROSSING_SLACK;
+  return any(floor(low) != floor(high));
 }
 
 /// Counts the tiles of every contour. One work-item per (view, edge).
@@ -61,7 +68,7 @@ static inline int is_long_edge(const FrameParams p, const ViewEdge e) {
 /// in   colors       float4[color] or, with a stride, float4[view][color]
 /// in   normal_faces, normals  uint4[face], float4[normal]  read where p.shading is DPR_BESIDE_NORMALS
 /// out  counts       uint[view][edge]
-/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, _ONE, _LEFT, _LONG. Not written of others
+/// out  kinds        uchar[view][edge]     DPR_CONTOUR_CREASE, _ONE, _LEFT, _SHORT; 0 of others
 kernel void contour_count(const FrameParams p, global const uint2* restrict edges,
                           global const uchar* restrict facing, global const float4* restrict ndc,
                           global const float4* restrict world, global const uint4* restrict faces,
@@ -74,25 +81,25 @@ kernel void contour_count(const FrameParams p, global const uint2* restrict edge
   const ContourScene s =
       scene_of_view(p, view, edges, facing, ndc, world, faces, clipped, colors, normal_faces, normals);
   counts[i] = 0;
+  kinds[i] = 0;
   if (is_within_surface(s, i - view * p.edges, p.shading)) return;
   const ViewEdge edge = view_edge(s.edges, i - view * p.edges);
-  uint count = 0;
   const int kind = contour_kind(s, edge, p.shading);
-  if (kind != DPR_NO_CONTOUR) {
-    const int is_left = inner_side(edge_sides(edge.record, s.facing)) > 0;
-    const uint crease = kind == DPR_CREASE              ? DPR_CONTOUR_CREASE
-                        : kind == DPR_CREASE_OF_COLORS  ? DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE
-                        : kind == DPR_CREASE_OF_NORMALS ? DPR_CONTOUR_ONE
-                                                        : 0;
-    kinds[i] =
-        (uchar)(crease | (is_left ? DPR_CONTOUR_LEFT : 0) | (is_long_edge(p, edge) ? DPR_CONTOUR_LONG : 0));
-    const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
-    for (uint row = t.rows.x; row <= t.rows.y; ++row) {
-      for (uint column = t.columns.x; column <= t.columns.y; ++column)
-        count += line_meets_tile(t, column, row) ? 1 : 0;
-    }
+  if (kind == DPR_NO_CONTOUR) return;
+  const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
+  uint count = 0;
+  for (uint row = t.rows.x; row <= t.rows.y; ++row) {
+    for (uint column = t.columns.x; column <= t.columns.y; ++column)
+      count += line_meets_tile(t, column, row) ? 1 : 0;
   }
-  counts[i] = count;
+  if (count == 0) return;
+  const int is_left = inner_side(edge_sides(edge.record, s.facing)) > 0;
+  const uint crease = kind == DPR_CREASE              ? DPR_CONTOUR_CREASE
+                      : kind == DPR_CREASE_OF_COLORS  ? DPR_CONTOUR_CREASE | DPR_CONTOUR_ONE
+                      : kind == DPR_CREASE_OF_NORMALS ? DPR_CONTOUR_ONE
+                                                      : 0;
+  kinds[i] = (uchar)(crease | (is_left ? DPR_CONTOUR_LEFT : 0) | (is_short(p, edge) ? DPR_CONTOUR_SHORT : 0));
+  if (may_cross_line(t)) counts[i] = count;
 }
 
 /// The contours of a view.
@@ -100,14 +107,11 @@ typedef struct {
   EdgeScene edges;
   global const uint* face_edges;               // see DPR_FACE_SIDES
   global const uint *corner_starts, *corners;  // face * 3 + corner, by vertex
-  global const uint* offsets;                  // of the view's edges: equal where an edge is no contour
   global const uchar* kinds;                   // of the view's edges
 } Contours;
 
 /// False only if an edge is a contour, and a short one.
-static inline int is_long(const Contours c, uint edge) {
-  return c.offsets[edge] == c.offsets[edge + 1] || (c.kinds[edge] & DPR_CONTOUR_LONG);
-}
+static inline int is_long(const Contours c, uint edge) { return !(c.kinds[edge] & DPR_CONTOUR_SHORT); }
 
 /// The edge of a face between two of its vertices.
 static inline uint edge_between(const Contours c, uint face, uint a, uint b) {
@@ -172,9 +176,8 @@ kernel void contour_fill(const FrameParams p, const uint capacity, global const 
   const uint first_edge = view * p.edges;
   const ViewEdge edge = view_edge(s, i - first_edge);
   uint contour = DPR_CONTOUR_FLAGS * i + kinds[i] % DPR_CONTOUR_FLAGS;
-  const Contours contours = {
-      s,       face_edges,           starts_of_view(p, view, p.vertices, corner_starts),
-      corners, offsets + first_edge, kinds + first_edge};
+  const Contours contours = {s, face_edges, starts_of_view(p, view, p.vertices, corner_starts), corners,
+                             kinds + first_edge};
   if (has_corner(contours, i - first_edge, edge, 0)) contour |= DPR_CONTOUR_FIRST_END;
   if (has_corner(contours, i - first_edge, edge, 1)) contour |= DPR_CONTOUR_SECOND_END;
   const TiledEdge t = tiled_edge(p, edge.end[0].xy, edge.end[1].xy);
