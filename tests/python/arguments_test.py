@@ -125,9 +125,13 @@ class ArgumentsTest(unittest.TestCase):
         self.assertTrue(np.array_equal(profile(192, 160, preset="softras"),
                                        profile(192, 160, preset="softras", sigma=1e-3)))
         changed = dpr.Renderer(64, 48)
-        changed.sigma = 1e-3
-        changed.sigma = None
-        np.testing.assert_array_equal(changed(*MESH, *cameras(1)), dpr.Renderer(64, 48, blur=1)(*MESH, *cameras(1)))
+        for name, value in (("sigma", 1e-3), ("preset", "softras")):
+            setattr(changed, name, value)
+            setattr(changed, name, None)
+            np.testing.assert_array_equal(changed(*MESH, *cameras(1)), dpr.Renderer(64, 48, blur=1)(*MESH, *cameras(1)))
+        np.testing.assert_array_equal(profile(64, 48, preset=None), profile(64, 48))
+        with self.assertRaisesRegex(TypeError, "width.*None"):
+            changed.width = None
         np.testing.assert_allclose(profile(64, 48, preset="opendr", blur=1), profile(64, 48, preset="opendr"), atol=1e-6)
         for wrong in ({"blur": 0.5, "sigma": 1e-3}, {"blur": -1}, {"blur": 0}, {"blur": float("inf")}, {"blur": "wide"}):
             with self.assertRaisesRegex((ValueError, TypeError), "blur"):
@@ -227,6 +231,10 @@ class ArgumentsTest(unittest.TestCase):
             renderer.jvp(shapes, FACES, view, lens, tangents={"views": tangent})[1],
             renderer.jvp(shapes, FACES, view[None], lens[None], tangents={"views": tangent[None]})[1])
         self.assertEqual(renderer.subdivide(TETRAHEDRON, FACES, view, lens).faces.shape, (4, 3))
+        for views, lenses in ((cameras(2)[0], lens), (view, cameras(2)[1])):
+            self.assertEqual(renderer.subdivide(TETRAHEDRON, FACES, views, lenses).faces.shape, (4, 3))
+        with self.assertRaisesRegex(ValueError, r"intrinsics \(dpr.subdivide\)"):
+            renderer.subdivide(TETRAHEDRON, FACES, cameras(3)[0], cameras(2)[1])
         with self.assertRaisesRegex(ValueError, r"views .* got \[4\], expected \[N, 4, 4\] or \[4, 4\]"):
             renderer(TETRAHEDRON, FACES, view[0], lens)
 

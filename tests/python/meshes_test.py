@@ -66,6 +66,9 @@ class FilesTest(unittest.TestCase):
         np.testing.assert_allclose(mesh["materials"]["specular"], [[0.5] * 3])
         with self.assertWarnsRegex(UserWarning, "without materials"):
             dpr.write_mesh(self.folder / "mesh.glb", **mesh)
+        del mesh["materials"]
+        with self.assertWarnsRegex(UserWarning, "without opacities"):
+            dpr.write_mesh(self.folder / "mesh.glb", **mesh, face_opacities=np.full(1, 0.5, np.float32))
 
     def test_images_go_through_files(self):
         image = np.random.default_rng(0).random((5, 7, 4), np.float32)

@@ -64,6 +64,11 @@ class OwnShadingTest(unittest.TestCase):
             found, own_pullback = samples.resolve_with_vjp(shaded(samples, COLORS))
             self.check_close(found, image, 1e-5)
             grad_values, by_contours = own_pullback(WEIGHTS)
+            for wrong in ((WEIGHTS,), None):
+                with self.assertRaisesRegex(TypeError, "gradient of the images .*an array"):
+                    own_pullback(wrong)
+            with self.assertRaisesRegex(TypeError, "barycentrics .*an array"):
+                samples.pullback(barycentrics="wrong")
             corners = COLORS[FACES[samples.face_id.clip(0)]]
             grad_barycentrics = (corners * grad_values[..., None, :3]).sum(-1) * samples.mask[..., None]
             inside = samples.pullback(barycentrics=grad_barycentrics)

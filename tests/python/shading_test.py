@@ -172,9 +172,22 @@ class EnvironmentTest(unittest.TestCase):
             ends = [torch.tensor(min(max(value + step, 0), 1)) for step in ((-1e-3, 0) if value == 1 else (0, 1e-3))]
             change = [environment.specular(tensors[0].detach(), end).sum() for end in ends]
             self.assertAlmostEqual(float(rough.grad), float((change[1] - change[0]).detach()) / 1e-3, delta=1e-2)
-        poles = torch.stack((UP, -UP, 0 * UP)).requires_grad_()
-        shading.Environment(random(8, 16, 3)).shade(poles, UP, torch.ones(3), 0.5, 0.5).sum().backward()
-        self.assertTrue(poles.grad.isfinite().all())
+
+    def test_poles(self):
+        """The image's columns meet there, each with a colour of its own."""
+        image = random(8, 16, 3)
+        environment, poles = shading.Environment(image), torch.stack((UP, -UP))
+        torch.testing.assert_close(environment.light(poles), torch.stack((image[0].mean(0), image[-1].mean(0))))
+        around, _ = directions(200)
+        near = shading.unit(poles[:, None] + 1e-3 * around)
+        self.assertLess((environment.light(near) - environment.light(poles)[:, None]).abs().max(), 0.01)
+        for points in (poles, near, 0 * poles):
+            points = points.clone().requires_grad_()
+            for values in (environment.light(points), environment.diffuse(points), environment.specular(points, 0.3)):
+                (grad,) = torch.autograd.grad(values.sum(), points)
+                self.assertLess(grad.abs().max(), 50)  # three channels of up to 1, half a row of pi / 16, columns of pi / 8
+            (grad,) = torch.autograd.grad(environment.shade(points, UP, torch.ones(3), 0.5, 0.5).sum(), points)
+            self.assertTrue(grad.isfinite().all())
 
     def test_refusals(self):
         for image, message in ((random(8, 8, 3), r"\[8, 8, 3\]"), (random(8, 16, 4), r"\[8, 16, 4\]"),
@@ -227,14 +240,14 @@ class ShadowTest(unittest.TestCase):
     FLOOR = torch.tensor([[-2.0, 0, -2], [2, 0, -2], [2, 0, 2], [-2, 0, 2]])
     FACES = torch.tensor([[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]])
 
-    def shadow(self, size, spot):
+    def shadow(self, size, spot, floor_throws):
         """Share of the floor that is dark."""
         sheet = self.FLOOR / 2 * size + UP
         vertices = torch.cat((self.FLOOR, sheet))
         view = dpr.look_at(torch.tensor([0.0, 4, 0]), up=torch.tensor([0.0, 0, -1]))
         camera = dpr.perspective(60, 96, 96) if spot else torch.tensor([[5.0]])
         renderer = dpr.Renderer(96, 96, blur=1.0, znear=1, zfar=8)
-        light = shading.ShadowMap(renderer, vertices, self.FACES, view, camera)
+        light = shading.ShadowMap(renderer, vertices, self.FACES[0 if floor_throws else 2:], view, camera)
         line = (torch.arange(200) + 0.5) / 50 - 2
         x, z = torch.meshgrid(line, line, indexing="ij")
         points = torch.stack((x, torch.zeros_like(x), z), -1)
@@ -245,10 +258,10 @@ class ShadowTest(unittest.TestCase):
         return (1 - visible).mean()
 
     def test_area_and_its_derivative(self):
-        for spot, scale in ((False, 1.0), (True, 4 / 3)):
-            with self.subTest(spot=spot):
+        for spot, scale, floor_throws in ((False, 1.0, True), (True, 4 / 3, True), (True, 4 / 3, False)):
+            with self.subTest(spot=spot, floor_throws=floor_throws):
                 size = torch.tensor(0.6, requires_grad=True)
-                area = self.shadow(size, spot)
+                area = self.shadow(size, spot, floor_throws)
                 side = 0.6 * scale / 2
                 self.assertLess(abs(float(area) / side**2 - 1), 0.02)
                 area.backward()
@@ -263,6 +276,11 @@ class ShadowTest(unittest.TestCase):
         self.assertLess(light.visibility(points)[2], 0.01)
         with self.assertRaisesRegex(ValueError, "intrinsics"):
             shading.ShadowMap(renderer, self.FLOOR, self.FACES, view, torch.zeros(1, 9))
+        points[:, :2] *= 0.1  # all in sight, of an empty map
+        for floor in (self.FLOOR + 100 * UP, self.FLOOR + torch.tensor([50.0, 0, 0])):
+            with self.assertWarnsRegex(UserWarning, "every triangle was dropped"):
+                nothing = shading.ShadowMap(renderer, floor, self.FACES[:2], view, dpr.perspective(20, 32, 32))
+            self.assertTrue(torch.equal(nothing.visibility(points), torch.ones(3, 1)))
 
 
 if __name__ == "__main__":

@@ -61,19 +61,21 @@ def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
 
 
 def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Array, *, colors: Optional[Array] = None,
-               face_colors: Optional[Array] = None, texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None,
-               textures: Any = None, face_textures: Optional[Array] = None, wrap: Union[str, Sequence[str]] = "repeat",
-               filter: Union[str, Sequence[str]] = "bilinear", materials: Any = None,
-               face_materials: Optional[Array] = None) -> None:
+               face_colors: Optional[Array] = None, opacities: Optional[Array] = None,
+               face_opacities: Optional[Array] = None, texcoords: Optional[Array] = None,
+               face_texcoords: Optional[Array] = None, textures: Any = None, face_textures: Optional[Array] = None,
+               wrap: Union[str, Sequence[str]] = "repeat", filter: Union[str, Sequence[str]] = "bilinear",
+               materials: Any = None, face_materials: Optional[Array] = None) -> None:
     """Writes a mesh as OBJ, PLY or GLB, by the extension, whole or not at all.
 
     The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8 bits;
     OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1] as texels are. GLB numbers vertices anew, in the order
-    of the faces, and has none that no face uses. Materials are left out, with a UserWarning. Raises OSError (dpr.IoError) where the file cannot
+    of the faces, and has none that no face uses. Materials and opacities are left out, with a UserWarning. Raises OSError (dpr.IoError) where the file cannot
     be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
     """
-    if materials is not None or face_materials is not None:
-        _library.warn(f"dpr: {file} is written without materials")
+    for what, left_out in (("materials", (materials, face_materials)), ("opacities", (opacities, face_opacities))):
+        if any(array is not None for array in left_out):
+            _library.warn(f"dpr: {file} is written without {what}")
     named = {"vertices": vertices, "faces": faces, "colors": colors, "face_colors": face_colors, "texcoords": texcoords,
              "face_texcoords": face_texcoords, "face_textures": face_textures}
     textures = [] if textures is None else textures if isinstance(textures, (list, tuple)) else [textures]

@@ -141,7 +141,7 @@ class Plan:
 
     def repeat(self, number, count):
         """Makes an array of one view one of as many."""
-        if count != 1 and self.leaves[number].shape[0] == 1:
+        if count != 1 and tuple(self.leaves[number].shape[:1]) == (1,):
             self.leaves[number] = _arrays.repeated(self.leaves[number], count)
 
     def blur_to_sigma(self, number, scale, power):

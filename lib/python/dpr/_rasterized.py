@@ -180,6 +180,9 @@ def _one(name, array):
 
 def _checked(name, array, shape):
     """Packed floats. Fails for another shape."""
+    array = _arrays.from_numbers(array)
+    if not _arrays.is_array(array):
+        _arrays.fail(TypeError, name, type(array).__name__, "an array", "dpr.Samples")
     array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
     if array.shape != shape or not array.size:
         _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")

@@ -47,16 +47,16 @@ class Renderer:
     """
 
     def __init__(self, width: int, height: int, *, device: str = "", **settings: Setting):
-        self._configure({"width": width, "height": height, "device": device, "preset": "pixel", **settings})
+        self._configure({"width": width, "height": height, "device": device, **settings})
 
     def _configure(self, given):
         """Takes all of a renderer, once it has been checked."""
         _plan.require_names(given, _OF_A_RENDERER)
-        given = {name: value.item() if _checked(name, value) else value for name, value in given.items()
-                 if value is not None}
+        given = {"preset": "pixel", **{name: value.item() if _checked(name, value) else value
+                                       for name, value in given.items() if value is not None}}
         if "sigma" in given and "blur" in given:
             _arrays.fail(ValueError, "blur", "blur and sigma", "one of them")
-        width, height = (_plan.pixels(name, given.pop(name)) for name in ("width", "height"))
+        width, height = (_plan.pixels(name, given.pop(name, None)) for name in ("width", "height"))
         device, texts = given.pop("device", ""), []
         has_blur = "sigma" in given or "blur" in given or given.get("preset") != "pixel"
         for name, value in (given if has_blur else {**given, "blur": _DEFAULT_BLUR}).items():
@@ -211,8 +211,8 @@ class Renderer:
         The arguments are those of a call. wrt: names of those whose gradients are wanted, ("vertices", "lights") say;
         all float arrays that are given unless it says otherwise.
 
-        Returns (result, pullback). pullback(grad_image, depth=grad_depth, ...) takes the gradient of the images, or None,
-        and those of outputs that have some, and returns a dictionary of arrays by the names of the arguments: of a list
+        Returns (result, pullback). pullback(image=grad_image, depth=grad_depth, ...) takes the gradient of the images, or
+        None, and those of outputs that have some, and returns a dictionary of arrays by the names of the arguments: of a list
         a list, of lights and materials dictionaries. It may be called again; the frame's buffers stay on the device as
         long as it is there. Raises ValueError for a name that is none of these, and another shape.
 
@@ -253,6 +253,7 @@ class Renderer:
         spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one=True)
         return spec._replace(settings=(*spec.settings, _plan.setting("layers", layers))), plan
 
+    @_arrays.named("dpr.subdivide")
     def subdivide(self, vertices: Array, faces: Array, views: Array, intrinsics: Array, *,
                   texcoords: Optional[Array] = None, face_texcoords: Optional[Array] = None, tolerance: float = 0.25,
                   copy: bool = False) -> Subdivision:
@@ -273,6 +274,9 @@ class Renderer:
         plan.add(("vertices",), vertices)
         plan.add(("faces",), faces, True)
         plan.add_camera(views, intrinsics)
+        count = max((leaf.shape[0] for leaf in plan.leaves[2:] if leaf.shape), default=1)
+        for number in (2, 3):
+            plan.repeat(number, count)
         _, _, tolerance = _plan.setting("tolerance", tolerance).partition("=")
         arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(leaf))) for (name,), leaf in zip(plan.paths, plan.leaves)]
         cut = Subdivision(self._spec(), arrays, float(tolerance), plan.given[0])

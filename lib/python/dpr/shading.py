@@ -27,6 +27,7 @@ from ._texture import texture as _texture
 
 Number = Union[float, Tensor]
 _LEAST = 1e-12  # of lengths
+_LEAST_COVERED = 1e-4  # of a shadow map's texel
 _LEAST_ALPHA = 1e-3  # of a microfacets' slopes: a mirror's highlights would be infinite
 _DIELECTRIC = 0.04  # reflectance at normal incidence, of glTF
 
@@ -96,6 +97,8 @@ def texture_at(texture: Tensor, texcoords: Tensor) -> Tensor:
     """Bilinear values [..., C] of a texture [H, W, C], row 0 on top, at texcoords [..., 2], v up, repeated beyond [0, 1]: as
     the renderer has its own."""
     _require("texcoords", texcoords, (2,), "[..., 2]")
+    if not isinstance(texture, Tensor) or texture.ndim != 3:
+        _fail("texture", list(texture.shape) if isinstance(texture, Tensor) else type(texture).__name__, "a tensor [H, W, C]")
     rows = texcoords.reshape(1, 1, -1, 2)
     found = _texture(texture.flip(0)[None].contiguous(), rows.contiguous(), filter_mode="linear", boundary_mode="wrap")
     return found.reshape(*texcoords.shape[:-1], texture.shape[-1])
@@ -195,11 +198,17 @@ def _bilinear(image, x, y, wraps):
     return upper * (1 - down) + lower * down
 
 
+def _with_poles(image):
+    """An equirectangular image with the means of its first and last rows beyond them, at the poles."""
+    return torch.cat([image[:1].mean(1, keepdim=True).expand_as(image[:1]), image,
+                      image[-1:].mean(1, keepdim=True).expand_as(image[-1:])])
+
+
 class Environment:
     """Light from all around, of an image.
 
     image  [H, W, 3], linear RGB, equirectangular: row 0 is up (+y), and its middle column lies towards -z, +x to the right
-           of it; of any size, twice as wide as high
+           of it; of any size, twice as wide as high. Straight up is the mean of row 0, straight down that of the last
 
     Reflections are Karis' split sum: means of the image by GGX for six degrees of roughness, each of 32 x 64 directions, and
     shares of an even light. A mirror has the image itself. Beside sums over all directions they are 2% off in an even light;
@@ -214,23 +223,28 @@ class Environment:
         if image.ndim != 3 or image.shape[1] != 2 * image.shape[0] or not image.shape[0]:
             _fail("image", list(image.shape), "[H, 2 H, 3]")
         self.image = image
+        self._with_poles = _with_poles(image)
         size = (self._HEIGHT, 2 * self._HEIGHT)
         small = torch.nn.functional.adaptive_avg_pool2d(image.permute(2, 0, 1), size).permute(1, 2, 0).reshape(-1, 3)
         alphas = [None, *((k / (self._LEVELS - 1)) ** 2 for k in range(1, self._LEVELS))]
-        self._means = [(_filter(self._HEIGHT, alpha).to(image.dtype) @ small).reshape(*size, 3) for alpha in alphas]
+        self._means = [_with_poles((_filter(self._HEIGHT, alpha).to(image.dtype) @ small).reshape(*size, 3))
+                       for alpha in alphas]
 
     @staticmethod
-    def _at(image, directions):
+    def _at(with_poles, directions):
         x, y, z = directions.reshape(-1, 3).unbind(-1)
-        flat = (x.square() + z.square()).clamp(min=_LEAST)
-        across = torch.atan2(x, torch.where(x.square() + z.square() > _LEAST, -z, flat)) / (2 * math.pi) + 0.5
-        down = torch.atan2(flat.sqrt(), y) / math.pi
-        height, width = image.shape[:2]
-        return _bilinear(image, across * width, down * height, True).reshape(*directions.shape[:-1], 3)
+        flat = x.square() + z.square()
+        is_pole = flat <= _LEAST  # where the image has no derivative, nor has a direction of length 0
+        across = torch.atan2(x.masked_fill(is_pole, 0), (-z).masked_fill(is_pole, 1)) / (2 * math.pi) + 0.5
+        height, width = with_poles.shape[0] - 2, with_poles.shape[1]
+        row = torch.atan2(flat.clamp(min=_LEAST).sqrt(), torch.where(is_pole, y.detach(), y)) / math.pi * height
+        # A pole lies half a row from the next row's middle.
+        row = row + 1 + (row - 0.5).clamp(max=0) + (row + 0.5 - height).clamp(min=0)
+        return _bilinear(with_poles, across * width, row, True).reshape(*directions.shape[:-1], 3)
 
     def light(self, directions: Tensor) -> Tensor:
         """Radiance [..., 3] from directions [..., 3]."""
-        return self._at(self.image, directions)
+        return self._at(self._with_poles, directions)
 
     def diffuse(self, normals: Tensor) -> Tensor:
         """What a white surface without gloss sends, [..., 3]: the mean of the radiance by the cosine."""
@@ -238,7 +252,7 @@ class Environment:
 
     def specular(self, directions: Tensor, roughness: Number) -> Tensor:
         """Mean radiance [..., 3] around reflected directions [..., 3], for a roughness [..., 1] or a number, 0 to 1."""
-        levels = [self.image, *self._means[1:]]
+        levels = [self._with_poles, *self._means[1:]]
         place = _share(torch.as_tensor(roughness, dtype=directions.dtype)) * (len(levels) - 1)
         lower = place.detach().floor().clamp(max=len(levels) - 2)
         above, total = place - lower, torch.zeros_like(directions)
@@ -271,9 +285,10 @@ class ShadowMap:
                      directional light an orthographic one
     bias             a point counts as lit up to such a distance behind what the light sees, of the map's depths
 
-    The map holds mean and mean square of the depths, under the noise; a point behind the mean is lit by Chebyshev's bound
-    (variance shadow maps, Donnelly and Lauritzen 2006): exact for one edge above a surface facing the light, too bright
-    where several surfaces throw shadows on top of each other. On a surface that shades itself the map's resolution shows:
+    The map holds how much of a texel the mesh covers, and mean and mean square of its depths there, under the noise; a point
+    behind the mean is lit by Chebyshev's bound (variance shadow maps, Donnelly and Lauritzen 2006) and by what is not
+    covered: exact for one edge above a surface facing the light, or above none, too bright where several surfaces throw
+    shadows on top of each other. On a surface that shades itself the map's resolution shows:
     differences over a small step are noisier than gradients there, and agree with the gradients' mean over a motion of some
     texels. Raises ValueError for cameras of other forms.
     """
@@ -291,8 +306,9 @@ class ShadowMap:
         self._near, far = (float(seen.min()), float(seen.max())) if seen.numel() else (0.0, 1.0)
         self._range = max(far - self._near, _LEAST, 1e-6 * abs(far))
         self._variance = bias**2
-        depth = torch.where(samples.mask, (samples.depth - self._near) / self._range, torch.ones_like(samples.depth))
-        self._moments = samples.resolve(torch.stack((depth, depth.square()), -1))[0]
+        covered = samples.mask.to(samples.depth)
+        depth = (samples.depth - self._near) / self._range * covered
+        self._moments = samples.resolve(torch.stack((depth, depth.square(), covered), -1))[0]
 
     def visibility(self, positions: Tensor) -> Tensor:
         """[..., 1] from 0 to 1, of points [..., 3]; 1 outside what the light's camera sees."""
@@ -310,8 +326,10 @@ class ShadowMap:
             fx, fy, cx, cy = self._intrinsics.unbind()
             x, y = cx + fx * points[:, 0] / divisor, cy - fy * points[:, 1] / divisor
         is_seen = is_seen & (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
-        mean, mean_square = _bilinear(self._moments, x.clamp(0, width), y.clamp(0, height), False).unbind(-1)
+        *moments, covered = _bilinear(self._moments, x.clamp(0, width), y.clamp(0, height), False).unbind(-1)
+        covered = _share(covered)
+        mean, mean_square = (moment / covered.clamp(min=_LEAST_COVERED) for moment in moments)
         behind = ((depth - self._near) / self._range - mean).clamp(min=0)
         variance = (mean_square - mean.square()).clamp(min=self._variance)
-        lit = variance / (variance + behind.square())
+        lit = 1 - covered + covered * variance / (variance + behind.square())
         return torch.where(is_seen, lit, torch.ones_like(lit)).reshape(*positions.shape[:-1], 1)
