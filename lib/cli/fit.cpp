@@ -356,8 +356,10 @@ void add_fit_command(CLI::App& application, CommonOptions& common) {
       ->required()
       ->type_name("MESH.obj");
   command
-      ->add_option("--texture", options->texture,
-                   "Texels a side of a texture that takes the place of the colours of vertices; OBJ and GLB")
+      ->add_option(
+          "--texture", options->texture,
+          "Texels a side of a texture that takes the place of the colours of vertices; OBJ and GLB. More "
+          "where two triangles would share less than 4x4")
       ->check(CLI::Range(1, TextureAtlas::k_most_side))
       ->type_name("SIZE");
   command

@@ -194,6 +194,9 @@ Scene read_photographed_scene(PoseCommandOptions& options, const std::optional<B
 /// Hands what is compared beside colours to the method, and returns the image of colours, empty without one.
 Image observe(ObservedPictures pictures, PoseCommandOptions& options) {
   if (auto* method = std::get_if<LeastSquares>(&options.solver.method)) {
+    if (method->unknown_background && pictures.target.pixels.empty())
+      throw InvalidArgument("--unknown-background (command line)", "no --target",
+                            "one, whose background it is");
     method->mask = std::move(pictures.mask);
     method->silhouette.image = std::move(pictures.silhouette);
     method->depth.image = std::move(pictures.depth);
@@ -293,7 +296,8 @@ void add_least_squares_options(CLI::App& command, PoseCommandOptions& options) {
       "IMAGE");
   add("--depth", options.pictures.depth,
       "Image whose first channel is the distance along the camera's axis, as --aov depth of dpr render "
-      "writes it; 0 or NaN where it is not known. Beside --target, or without",
+      "--preset rigid writes it; 0 or NaN where it is not known. Beside --target, or without: then of the "
+      "object alone, and 0 elsewhere",
       "DEPTH.exr");
   add_observation_weights(command, k_least_squares_group, method, options.pictures.depth_scale);
   command

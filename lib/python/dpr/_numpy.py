@@ -30,8 +30,8 @@ def _require_given(argument, names, plan):
     given = {path[0] for path, leaf in zip(plan.paths, plan.leaves) if _arrays.type_of(leaf) == "float32"}
     for name in names:
         if name not in given:
-            _arrays.fail(ValueError, argument, repr(name), "names of given arrays that are no indices (numbers are none, "
-                         "np.array(number) is one): " + ", ".join(sorted(given)))
+            _arrays.fail(ValueError, argument, repr(name), "names of given arrays that are no indices: " +
+                         ", ".join(sorted(given)) + "; a number is one as np.array(number)")
 
 
 def _at(path, place):

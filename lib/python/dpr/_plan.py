@@ -144,6 +144,14 @@ class Plan:
         if count != 1 and tuple(self.leaves[number].shape[:1]) == (1,):
             self.leaves[number] = _arrays.repeated(self.leaves[number], count)
 
+    def repeat_camera(self, camera, count=None):
+        """The same of both, as add_camera() returns them: of so many views, or as many as the other has."""
+        numbers = [number for number, _, _ in camera]
+        if count is None:
+            count = max((self.leaves[number].shape[0] for number in numbers if self.leaves[number].shape), default=1)
+        for number in numbers:
+            self.repeat(number, count)
+
     def blur_to_sigma(self, number, scale, power):
         blur = self.leaves[number]
         if _arrays.module_of(blur) not in ("torch", "jax"):
@@ -287,8 +295,7 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
     lights_given = {name: _arrays.from_numbers(array) for name, array in dictionary("lights", lights).items()}
     count = _count_views((views, intrinsics), mesh, lights_given)
     if len(intrinsics.shape) == 2:
-        for number in range(2):
-            plan.repeat(number, count)
+        plan.repeat_camera(of_views.values(), count)
         views, intrinsics = plan.leaves
     if background is not None:
         shared["background"] = plan.add(("background",), background)

@@ -259,11 +259,11 @@ class Renderer:
                   copy: bool = False) -> Subdivision:
         """Cuts a mesh's faces where lenses bend their edges, which images draw straight between vertices.
 
-        vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a
-        point of one further than `tolerance` pixels from where it is drawn, for all faces at them, also between
-        vertices that only coincide. Without lenses nothing is cut. The result is right for meshes and cameras near
-        these: cut again when they have moved. With lights, normals are those of the pieces: new vertices have their
-        face's own, so that what coarse faces shade smoothly gets flat within them.
+        vertices [V, 3], and faces, views and intrinsics as a call takes them. Edges are halved until no view shows a point of
+        one further than `tolerance` pixels from where it is drawn, for all faces at them, also between vertices that only
+        coincide. Without lenses nothing is cut. The result is right for meshes and cameras near these: cut again when they
+        have moved. With lights, normals are those of the pieces: new vertices have their face's own, so that what coarse
+        faces shade smoothly gets flat within them.
 
         texcoords and face_texcoords, as a call takes them, come back as the pieces': `texcoords` [F', 3, 2] of the result,
         with gradients of the given ones.
@@ -273,10 +273,7 @@ class Renderer:
         plan = _plan.Plan(copy)
         plan.add(("vertices",), vertices)
         plan.add(("faces",), faces, True)
-        plan.add_camera(views, intrinsics)
-        count = max((leaf.shape[0] for leaf in plan.leaves[2:] if leaf.shape), default=1)
-        for number in (2, 3):
-            plan.repeat(number, count)
+        plan.repeat_camera(plan.add_camera(views, intrinsics))
         _, _, tolerance = _plan.setting("tolerance", tolerance).partition("=")
         arrays = [(name, np.ascontiguousarray(_arrays.to_numpy(leaf))) for (name,), leaf in zip(plan.paths, plan.leaves)]
         cut = Subdivision(self._spec(), arrays, float(tolerance), plan.given[0])
