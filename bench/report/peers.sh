@@ -9,7 +9,7 @@ if [[ ${1:-} != --draw ]]; then
   export PATH=$PWD/build/release/bin:$PATH PYTHONPATH=$PWD/build/release/python DPR_DEVICE=cpu
   if [[ ! -e build/peers/complete ]]; then
     /usr/bin/python3 -m venv build/peers
-    build/peers/bin/pip install --quiet deodr trimesh mitsuba
+    build/peers/bin/pip install --quiet deodr trimesh typing_extensions mitsuba
     touch build/peers/complete
   fi
   /usr/bin/python3 bench/report/peers.py --python build/peers/bin/python -o "$results/peers.csv"
