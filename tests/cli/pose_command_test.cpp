@@ -404,7 +404,8 @@ TEST_SUITE("robustness") {
     check("--depth black.exr", "--depth (command line): got no pixel that has one");
     check("--depth far.exr", "expected some from znear to zfar");
     check("--target target.exr --depth-scale 1", "--depth-scale (command line): got no --depth");
-    check("--silhouette black.png --unknown-background", "--unknown-background (command line): got no --target");
+    check("--silhouette black.png --unknown-background",
+          "--unknown-background (command line): got no --target");
     check("--silhouette target.exr --report report", "--report (command line): got no --target");
     check("--silhouette target.exr --iterations 4", "options of least squares beside those of the descent");
   }
