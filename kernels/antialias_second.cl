@@ -141,7 +141,7 @@ kernel void antialias_second_forward(const FrameParams p, global const uint* res
                                      global const uint* restrict winner, global const float2* restrict cut,
                                      global const float4* restrict raster, global float4* restrict blended) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
-  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
+  if (rows.first >= rows.last || !may_be_crossed(p, rows.tile, tile_starts)) return;
   const Steps steps = {winner, cut, samples_of_window(p)};
   const NearTiles tiles = tiles_of_steps(p, rows.tile);
   for (uint i = 0; i < near_lists(tiles); ++i) {

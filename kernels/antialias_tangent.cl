@@ -264,7 +264,7 @@ kernel void antialias_second_tangent(
     global const float4* restrict raster, global const float2* restrict cut_tangents,
     global const float4* restrict faded_tangents, global float4* restrict tangents) {
   const TileRows rows = tile_rows(p, (uint)get_global_id(0));
-  if (rows.first >= rows.last || !is_near_contour(p, rows.tile, 1, tile_starts)) return;
+  if (rows.first >= rows.last || !may_be_crossed(p, rows.tile, tile_starts)) return;
   const Steps steps = {winner, cut, samples_of_window(p)};
   const NearTiles tiles = tiles_of_steps(p, rows.tile);
   for (uint i = 0; i < near_lists(tiles); ++i) {

@@ -84,10 +84,15 @@ def as_type(array, name):
     return array.astype(name) if kind == "jax" else to_numpy(array).astype(name, copy=False)
 
 
+def require_array(name, array, where="dpr.render", expected="a tensor or an array"):
+    """Fails for what is none."""
+    if not is_array(array):
+        fail(TypeError, name, type(array).__name__, expected, where)
+
+
 def converted(name, array, is_indices=False, where="dpr.render"):
     """The array as float32, or as int32 or int64. Fails for no array and for another kind of numbers."""
-    if not is_array(array):
-        fail(TypeError, name, type(array).__name__, "a tensor or an array", where)
+    require_array(name, array, where)
     kind = type_of(array)
     if kind != "float32" and isinstance(array, np.ndarray):
         kind = array.dtype.name  # ">f4" is "float32"

@@ -96,12 +96,12 @@ def vjp(spec, plan, wrt):
         grads = []
         for name, (shape, _) in zip(["image", *spec.outputs], _frames.shapes_of(spec, rendered.outputs[0].shape[0])):
             grad = _arrays.from_numbers(image if name == "image" else outputs.get(name))
-            if grad is not None and not _arrays.is_array(grad):
-                _arrays.fail(TypeError, f"gradient of {name}", type(grad).__name__,
-                             "an array; those of outputs by their names")
-            if grad is not None and tuple(grad.shape) != shape:
-                _arrays.fail(ValueError, f"gradient of {name}", list(grad.shape), list(shape))
-            grads.append(grad if grad is None else _arrays.to_numpy(grad))
+            if grad is not None:
+                _arrays.require_array(f"gradient of {name}", grad, expected="an array; those of outputs by their names")
+                if tuple(grad.shape) != shape:
+                    _arrays.fail(ValueError, f"gradient of {name}", list(grad.shape), list(shape))
+                grad = _arrays.to_numpy(grad)
+            grads.append(grad)
         found = rendered.gradients(grads)
         for leaf, slope in plan.slopes.items():
             if leaf in found:

@@ -86,7 +86,7 @@ class Rasterized:
     def resolve_gradients(self, values, grad_images):
         """(gradient of the values, {leaf: gradient})"""
         values = _checked("values", values, (*self.size, values.shape[-1]))
-        grad_images = _checked("grad_images", grad_images, (*self._image_size, values.shape[-1]))
+        grad_images = _checked("gradient of the images", grad_images, (*self._image_size, values.shape[-1]))
         grad_values = np.empty(values.shape, np.float32)
         found = self._gradients("dpr_frame_resolve_backward", _one("values", values), _one("grad_images", grad_images),
                                 _one("grad_values", grad_values))
@@ -181,8 +181,7 @@ def _one(name, array):
 def _checked(name, array, shape):
     """Packed floats. Fails for another shape."""
     array = _arrays.from_numbers(array)
-    if not _arrays.is_array(array):
-        _arrays.fail(TypeError, name, type(array).__name__, "an array", "dpr.Samples")
+    _arrays.require_array(name, array, "dpr.Samples")
     array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
     if array.shape != shape or not array.size:
         _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")

@@ -230,7 +230,7 @@ class Samples:
         kept = self._of_all(given)
 
         def pullback(grad_images):
-            grad_values, found = self._rasterized.resolve_gradients(kept, _kept(grad_images, "gradient of the images"))
+            grad_values, found = self._rasterized.resolve_gradients(kept, grad_images)
             if given.ndim == 2:
                 grad_values = _arrays.rows(grad_values.reshape(-1, given.shape[-1]), self._covered)
             return _arrays.like(values, grad_values), self._by_name(found)
