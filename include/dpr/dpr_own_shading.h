@@ -32,11 +32,26 @@ DPR_API dpr_status dpr_frame_samples(dpr_frame* frame, const dpr_array* samples,
  * rest. */
 DPR_API dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, size_t grad_count,
                                               const dpr_array* gradients, size_t gradient_count);
+/* The samples of the nearest layer that show a face, for a shader that works on no others: how many there are, M. They
+ * are in the order of "face_id". */
+DPR_API dpr_status dpr_frame_covered(dpr_frame* frame, size_t* count);
+/* Numbers of vertices at these M samples. Arrays: attributes [V, C] or [N, V, C]; and faces [F, 3] or [N, F, 3], indices
+ * of the attributes for the corners of the frame's faces, or none for its own. values: [M, C]. */
+DPR_API dpr_status dpr_frame_interpolate(dpr_frame* frame, const dpr_array* arrays, size_t count,
+                                         const dpr_array* values);
+/* The gradients of sum <grad_values, values>: of the attributes, and into `gradients` of vertices, views and intrinsics
+ * by way of the samples' places on their faces, as dpr_frame_samples_backward() has them. */
+DPR_API dpr_status dpr_frame_interpolate_backward(dpr_frame* frame, const dpr_array* arrays, size_t count,
+                                                  const dpr_array* grad_values,
+                                                  const dpr_array* grad_attributes,
+                                                  const dpr_array* gradients, size_t gradient_count);
 /* From values of the samples, [N, h, w, C] with any number of channels, to images [N, height, width, C]: blended across
- * contours and blurred. Linear in the values, which samples without a face need too. */
+ * contours and blurred. Linear in the values, which samples without a face need too: of values [M, C] of the samples of
+ * dpr_frame_covered() these are 0. */
 DPR_API dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images);
 /* The gradients of sum <grad_images, images>: of the values, and into `gradients` of vertices, views and intrinsics by
- * way of the contours. That of sigma is refused. */
+ * way of the contours. That of sigma is refused. values: NULL for those of the frame's last dpr_frame_resolve(), of at
+ * most 4 channels; another call that resolves values makes this an error. */
 DPR_API dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values,
                                               const dpr_array* grad_images, const dpr_array* grad_values,
                                               const dpr_array* gradients, size_t gradient_count);

@@ -13,6 +13,8 @@
 #include "batch/renderer_pool.hpp"
 #include "dpr/dpr.h"
 #include "dpr/light.hpp"
+#include "renderer/interpolate.hpp"
+#include "renderer/renderer_impl.hpp"
 
 namespace dpr::batch {
 
@@ -52,8 +54,13 @@ class Batch {
   void read_samples(NamedArrays samples);
   void samples_backward(NamedArrays grads, NamedArrays gradients);
   void clip_space_rast(NamedArrays arrays, NamedArrays outputs);
+  std::size_t covered_count() { return covered().numbers.size(); }
+  void interpolate(NamedArrays arrays, const NamedArray& values);
+  void interpolate_backward(NamedArrays arrays, const NamedArray& grad_values, const NamedArray& grad_attributes,
+                            NamedArrays gradients);
   void resolve(const NamedArray& values, const NamedArray& images);
-  void resolve_backward(const NamedArray& values, const NamedArray& grad_images,
+  /// values: none for those that resolve() took last.
+  void resolve_backward(const NamedArray* values, const NamedArray& grad_images,
                         const NamedArray& grad_values, NamedArrays gradients);
   void samples_tangent(std::size_t directions, NamedArrays tangents, NamedArrays samples);
   void resolve_tangent(std::size_t directions, NamedArrays tangents, const NamedArray& values,
@@ -64,6 +71,20 @@ class Batch {
   bool is_empty();
 
  private:
+  /// Samples of the nearest surfaces that show a face, in order.
+  struct Covered {
+    std::vector<cl_uint> numbers;  ///< among all samples
+    std::vector<std::int32_t> faces;
+    std::vector<vec2> places;  ///< barycentrics of corners 1 and 2
+  };
+  const Covered& covered();
+  /// Attributes of the vertices that they show, by the faces of the arrays or the mesh's; keeps those of the arrays.
+  Attributes attributes_of(NamedArrays arrays, std::vector<glm::uvec3>& faces);
+  SampleArrays covered_samples();
+  /// Throws InvalidArgument unless an array is floats [M, channels] of the samples that show a face.
+  void require_covered(const NamedArray& array, std::size_t channels);
+  /// Of all samples, or of those with a face, by the array's dimensions.
+  SampleValues values_of(const NamedArray& array);
   /// Throws InvalidArgument for another shape than the output's, whose pixels have so many channels; 0: a
   /// number.
   void require_image(const NamedArray& array, std::size_t channels);
@@ -88,6 +109,7 @@ class Batch {
   void add_tangent(const NamedArray& tangent, std::span<const float> numbers, SceneTangent& direction);
 
   Frame frame_;
+  std::optional<Covered> covered_;  ///< found when first asked for
   std::vector<std::string> wanted_;
   std::vector<glm::vec3> vertices_;  ///< [view][vertex], where the gradients of views need them
 };

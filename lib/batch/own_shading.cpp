@@ -11,7 +11,6 @@
 #include "batch/inputs.hpp"
 #include "c/handles.hpp"
 #include "dpr/error.hpp"
-#include "renderer/renderer_impl.hpp"
 
 namespace dpr::batch {
 namespace {
@@ -150,30 +149,151 @@ void Batch::samples_backward(NamedArrays grads, NamedArrays gradients) {
   add_gradients(found, true, gradients);
 }
 
-void Batch::resolve(const NamedArray& values, const NamedArray& images) {
-  require_values(values, true, nullptr);
-  require_values(images, false, &values);
+const Batch::Covered& Batch::covered() {
+  if (covered_) return *covered_;
   Renderer::Impl& m = impl_of(frame_.renderer());
-  m.require_values(values.rows<const float>(), values.shape.back());
-  m.resolve(values.rows<const float>(), values.shape.back(), images.rows<float>());
+  m.require_samples("own shading");
+  m.find_samples();
+  const MappedRead faces(m.surface_samples->faces);
+  const MappedRead places(m.surface_samples->places);
+  const std::size_t count = faces.size() / m.layers, parts = std::max<std::size_t>(count / k_least_of_thread, 1);
+  std::vector<Covered> of_parts(parts);
+  const auto find_part = [&](std::size_t part) {
+    Covered& found = of_parts[part];
+    for (std::size_t i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+      if (faces[i] == DPR_NO_FACE) continue;
+      found.numbers.push_back(to_uint(i));
+      found.faces.push_back(static_cast<std::int32_t>(faces[i]));
+      found.places.emplace_back(places[i].s[0], places[i].s[1]);
+    }
+  };
+  for_each_in_parallel(parts, find_part, 1);
+  covered_.emplace(std::move(of_parts[0]));
+  for (const Covered& part : std::span(of_parts).subspan(1)) {
+    covered_->numbers.insert(covered_->numbers.end(), part.numbers.begin(), part.numbers.end());
+    covered_->faces.insert(covered_->faces.end(), part.faces.begin(), part.faces.end());
+    covered_->places.insert(covered_->places.end(), part.places.begin(), part.places.end());
+  }
+  return *covered_;
 }
 
-void Batch::resolve_backward(const NamedArray& values, const NamedArray& grad_images,
+SampleArrays Batch::covered_samples() {
+  const dpr_raster size = raster();
+  const auto width = static_cast<std::size_t>(size.width), height = static_cast<std::size_t>(size.height);
+  const Covered& found = covered();
+  return {{width, height, 1, frame_.renderer().views().size() * width * height},
+          found.numbers,
+          found.faces.data(),
+          found.places.data()};
+}
+
+void Batch::require_covered(const NamedArray& array, std::size_t channels) {
+  const std::size_t count = covered_count();
+  const std::string expected = "[" + std::to_string(count) + ", " +
+                               (channels == k_any ? "C" : std::to_string(channels)) + "], samples with a face";
+  require_floats(array, {count, channels}, expected);
+  if (array.shape[0] != count || array.shape[1] == 0)
+    throw InvalidArgument(argument(array), text_of(array.shape), expected);
+}
+
+Attributes Batch::attributes_of(NamedArrays arrays, std::vector<glm::uvec3>& faces) {
+  for (const NamedArray& array : arrays) require_one_of(array, {"attributes", "faces"}, "attributes or faces");
+  const NamedArray& attributes = require(arrays, "attributes");
+  require_form(attributes, Element::float32, {{k_any, k_any}, {k_any, k_any, k_any}}, "[V, C] or [N, V, C]");
+  const std::size_t views = frame_.renderer().views().size();
+  const auto is_of_views = [&](const NamedArray& array) {
+    if (array.shape.size() == 3 && array.shape[0] != views)
+      throw InvalidArgument(argument(array), text_of(array.shape), std::to_string(views) + " of them");
+    return array.shape.size() == 3;
+  };
+  Attributes of{{}, attributes.rows<const float>(), attributes.shape.back(), is_of_views(attributes), false};
+  const Renderer& renderer = frame_.renderer();
+  if (const NamedArray* const given = find(arrays, "faces")) {
+    of.faces_are_of_views = is_of_views(*given);
+    faces = read_triples(*given, of.faces_are_of_views ? views : 1);
+    of.faces = faces;
+  } else {
+    of.faces = renderer.scene().meshes[0].mesh.faces;
+    of.faces_are_of_views = impl_of(renderer).geometry->has_own_faces();
+  }
+  return of;
+}
+
+void Batch::interpolate(NamedArrays arrays, const NamedArray& values) {
+  std::vector<glm::uvec3> faces;
+  const Attributes attributes = attributes_of(arrays, faces);
+  require_covered(values, attributes.channels);
+  dpr::interpolate(covered_samples(), attributes, values.rows<float>());
+}
+
+void Batch::interpolate_backward(NamedArrays arrays, const NamedArray& grad_values,
+                                 const NamedArray& grad_attributes, NamedArrays gradients) {
+  Renderer& renderer = frame_.renderer();
+  start_gradients(gradients);
+  std::vector<glm::uvec3> faces;
+  const Attributes attributes = attributes_of(arrays, faces);
+  require_covered(grad_values, attributes.channels);
+  require_like(grad_attributes, require(arrays, "attributes"));
+  const InterpolateGradient by =
+      dpr::interpolate_backward(covered_samples(), attributes, grad_values.rows<const float>(), {});
+  std::ranges::copy(by.values, grad_attributes.rows<float>().begin());
+  if (gradients.empty()) return;
+  const std::vector<cl_uint>& numbers = covered().numbers;
+  renderer.set_gradients(request_of(wanted_, true));
+  SceneGradient found = impl_of(renderer).samples_backward([&](std::span<cl_float4> places) {
+    for_each_in_parallel(places.size(), [&](std::size_t i) { places[i] = {}; });
+    for_each_in_parallel(numbers.size(), [&](std::size_t i) {
+      places[numbers[i]] = {{by.barycentrics[i].x, by.barycentrics[i].y, 0, 0}};
+    });
+  });
+  add_gradients(found, true, gradients);
+}
+
+SampleValues Batch::values_of(const NamedArray& array) {
+  if (array.shape.size() == 2) {
+    require_covered(array, k_any);
+    checks::require_numbers(array.rows<const float>(), array.count(), "samples (resolve)");
+    return {array.rows<const float>(), array.shape.back(), &covered().numbers};
+  }
+  require_values(array, true, nullptr);
+  impl_of(frame_.renderer()).require_values(array.rows<const float>(), array.shape.back());
+  return {array.rows<const float>(), array.shape.back()};
+}
+
+void Batch::resolve(const NamedArray& values, const NamedArray& images) {
+  const SampleValues given = values_of(values);
+  require_values(images, false, &values);
+  impl_of(frame_.renderer()).resolve(given, images.rows<float>());
+}
+
+void Batch::resolve_backward(const NamedArray* values, const NamedArray& grad_images,
                              const NamedArray& grad_values, NamedArrays gradients) {
   Renderer& renderer = frame_.renderer();
   start_gradients(gradients);
-  require_values(values, true, nullptr);
-  require_values(grad_images, false, &values);
-  require_values(grad_values, true, &values);
+  const bool is_covered = grad_values.shape.size() == 2;
+  SampleValues given{{}, grad_values.shape.empty() ? 0 : grad_values.shape.back(),
+                     is_covered ? &covered().numbers : nullptr, true};
+  if (values) {
+    given = values_of(*values);
+  } else if (!impl_of(renderer).holds_resolved()) {
+    throw InvalidArgument("values (batch)", "NULL",
+                          "values, unless dpr_frame_resolve() took them last, of at most 4 channels");
+  }
+  if (values) {
+    require_like(grad_values, *values);
+  } else if (is_covered) {
+    require_covered(grad_values, k_any);
+  } else {
+    require_values(grad_values, true, nullptr);
+  }
+  require_values(grad_images, false, &grad_values);
   if (find(gradients, "sigma"))
     throw InvalidArgument("sigma (batch)", "its gradient",
                           "that of vertices, views or intrinsics, with own shading");
   renderer.set_gradients(request_of(wanted_, true));
-  const auto samples = values.rows<const float>(), grads = grad_images.rows<const float>();
-  impl_of(renderer).require_values(samples, values.shape.back());
+  const auto grads = grad_images.rows<const float>();
   checks::require_numbers(grads, grads.size(), "grad_pixels (resolve)");
-  SceneGradient found =
-      impl_of(renderer).resolve_backward(samples, values.shape.back(), grads, grad_values.rows<float>());
+  SceneGradient found = impl_of(renderer).resolve_backward(given, grads, grad_values.rows<float>());
   add_gradients(found, true, gradients);
 }
 
@@ -211,6 +331,31 @@ dpr_status dpr_frame_samples_backward(dpr_frame* frame, const dpr_array* grads, 
   });
 }
 
+dpr_status dpr_frame_covered(dpr_frame* frame, std::size_t* count) {
+  return guarded([&] { deref(count, "count") = deref(frame, "frame").batch->covered_count(); });
+}
+
+dpr_status dpr_frame_interpolate(dpr_frame* frame, const dpr_array* arrays, std::size_t count,
+                                 const dpr_array* values) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->interpolate(dpr::batch::to_arrays(arrays, count, "arrays"),
+                            dpr::batch::to_arrays(values, 1, "values")[0]);
+  });
+}
+
+dpr_status dpr_frame_interpolate_backward(dpr_frame* frame, const dpr_array* arrays, std::size_t count,
+                                          const dpr_array* grad_values, const dpr_array* grad_attributes,
+                                          const dpr_array* gradients, std::size_t gradient_count) {
+  return guarded([&] {
+    deref(frame, "frame")
+        .batch->interpolate_backward(dpr::batch::to_arrays(arrays, count, "arrays"),
+                                     dpr::batch::to_arrays(grad_values, 1, "grad_values")[0],
+                                     dpr::batch::to_arrays(grad_attributes, 1, "grad_attributes")[0],
+                                     dpr::batch::to_arrays(gradients, gradient_count, "gradients"));
+  });
+}
+
 dpr_status dpr_frame_resolve(dpr_frame* frame, const dpr_array* values, const dpr_array* images) {
   return guarded([&] {
     deref(frame, "frame")
@@ -224,7 +369,7 @@ dpr_status dpr_frame_resolve_backward(dpr_frame* frame, const dpr_array* values,
                                       std::size_t gradient_count) {
   return guarded([&] {
     deref(frame, "frame")
-        .batch->resolve_backward(dpr::batch::to_arrays(values, 1, "values")[0],
+        .batch->resolve_backward(values ? &dpr::batch::to_arrays(values, 1, "values")[0] : nullptr,
                                  dpr::batch::to_arrays(grad_images, 1, "grad_images")[0],
                                  dpr::batch::to_arrays(grad_values, 1, "grad_values")[0],
                                  dpr::batch::to_arrays(gradients, gradient_count, "gradients"));

@@ -59,12 +59,12 @@ class Table {
   }
 
   std::size_t channels() const { return attributes_.channels; }
-  std::size_t count() const { return samples_.size().count; }
+  std::size_t count() const { return samples_.count(); }
   bool is_empty(std::size_t sample) const { return samples_.face(sample) < 0; }
 
   /// The first of the numbers of a sample's corners.
   std::array<std::size_t, 3> corners(std::size_t sample) const {
-    const std::size_t view = sample / of_view_ % views_;
+    const std::size_t view = samples_.number(sample) / of_view_ % views_;
     const uvec3& face = attributes_.faces[view * faces_ + static_cast<std::size_t>(samples_.face(sample))];
     const std::size_t first = view * row_stride_;
     return {(first + face.x) * channels(), (first + face.y) * channels(), (first + face.z) * channels()};
@@ -72,9 +72,10 @@ class Table {
 
   /// Behind the samples after it that show the same face of the same view.
   std::size_t end_of_run(std::size_t sample) const {
-    const std::size_t end = (sample / of_view_ + 1) * of_view_;
+    const std::size_t end = (samples_.number(sample) / of_view_ + 1) * of_view_;
     std::size_t last = sample + 1;
-    while (last < end && samples_.face(last) == samples_.face(sample)) ++last;
+    while (last < count() && samples_.number(last) < end && samples_.face(last) == samples_.face(sample))
+      ++last;
     return last;
   }
 
@@ -146,6 +147,7 @@ void fill(const Table& table, std::size_t of_sample, std::span<float> out, const
 SampleArrays::SampleArrays(const Samples& samples)
     : size_{static_cast<std::size_t>(samples.width), static_cast<std::size_t>(samples.height),
             static_cast<std::size_t>(samples.layers), samples.faces.size()},
+      count_(samples.faces.size()),
       faces_(samples.faces.data()),
       places_(samples.barycentrics.data()),
       steps_(samples.steps.empty() ? nullptr : samples.steps.data()) {

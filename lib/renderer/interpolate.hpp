@@ -8,7 +8,8 @@
 
 namespace dpr {
 
-/// What samples show, [layer][view][height][width], in one of three layouts, valid as long as the arrays.
+/// What samples show, [layer][view][height][width], in one of three layouts, or some of them; valid as long as the
+/// arrays.
 class SampleArrays {
  public:
   struct Size {
@@ -19,12 +20,20 @@ class SampleArrays {
   explicit SampleArrays(const Samples& samples);
   /// As dpr_frame_samples() writes them. steps: or null.
   SampleArrays(const Size& size, const std::int64_t* face_id, const vec3* barycentrics, const vec4* steps)
-      : size_(size), face_id_(face_id), barycentrics_(barycentrics), steps_(steps) {}
+      : size_(size), count_(size.count), face_id_(face_id), barycentrics_(barycentrics), steps_(steps) {}
   /// As dpr_clip_space_rast() writes them. rast_db: or null.
   SampleArrays(const Size& size, const vec4* rast, const vec4* rast_db)
-      : size_(size), steps_(rast_db), rast_(rast) {}
+      : size_(size), count_(size.count), steps_(rast_db), rast_(rast) {}
 
-  const Size& size() const { return size_; }
+  /// Those with these numbers, in ascending order, of as many as `size` says; each shows a face.
+  SampleArrays(const Size& size, std::span<const std::uint32_t> numbers, const std::int32_t* faces,
+               const vec2* places)
+      : size_(size), count_(numbers.size()), numbers_(numbers.data()), faces_(faces), places_(places) {}
+
+  const Size& size() const { return size_; }  ///< with those that are left out
+  std::size_t count() const { return count_; }
+  /// Among all that there are.
+  std::size_t number(std::size_t i) const { return numbers_ ? numbers_[i] : i; }
   bool has_steps() const { return steps_ != nullptr; }
 
   /// Below 0 where nothing is.
@@ -49,6 +58,8 @@ class SampleArrays {
   static constexpr float k_most_of_rast = 1U << 25U;  // more than it can count to
 
   Size size_;
+  std::size_t count_;
+  const std::uint32_t* numbers_ = nullptr;
   const std::int32_t* faces_ = nullptr;
   const vec2* places_ = nullptr;
   const std::int64_t* face_id_ = nullptr;

@@ -31,9 +31,11 @@ class GeometricRequest {
   GradientRequest whole_;
 };
 
+constexpr std::size_t k_of_group = 4;  // channels that are smoothed together
+
 /// Four channels of packed vectors, or those that are left, from `first` on.
 FloatVectors group_of(const Buffer<float>& packed, std::size_t first, std::size_t channels) {
-  return {packed.cl_buffer()(), first, channels, std::min<std::size_t>(channels - first, 4)};
+  return {packed.cl_buffer()(), first, channels, std::min(channels - first, k_of_group)};
 }
 
 /// Calls a function while the rasterizer holds the fragments of each band of a frame.
@@ -85,6 +87,7 @@ void Renderer::Impl::see_layers(cl_uint count) {
       *this, [&] { pixel_noise->antialias.find_front(frame, bin, rasterize, pixel_noise->contour, count); });
   pixel_noise->antialias.cross(contour_inputs(), pixel_noise->contour);
   seen_layers_ = count;
+  resolved_ = 0;
 }
 
 /// From `grad_vertices` and, of clipped faces, `clip.grad` to the host's.
@@ -115,45 +118,97 @@ SceneGradient Renderer::Impl::samples_backward(const WritePlaces& write) {
   return finish_geometric_gradient();
 }
 
-void Renderer::Impl::resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels) {
-  see_layers(layers);
-  Device::Impl& on = impl_of(device);
-  own_samples_.resize(on, samples.size());
-  const LentWrite write(on, own_samples_.cl_buffer(), std::as_bytes(samples));
-  own_pixels_.resize(on, pixels.size());
-  const std::size_t sample_count = samples.size() / channels, pixel_count = pixels.size() / channels;
-  own_group_.resize(on, sample_count);
-  for (std::size_t first = 0; first < channels; first += 4) {
-    made_exchange().give(group_of(own_samples_, first, channels), sample_count, vectors_of(own_group_, 0, 4));
-    pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
-    const FloatVectors to = group_of(own_pixels_, first, channels);
-    made_exchange().give(vectors_of(own_image_, 0, 4), pixel_count, to);
+bool Renderer::Impl::holds_resolved() const { return pixel_noise && resolved_ == pixel_noise->smoothed(); }
+
+/// Four of the caller's channels at the samples, from `first` on, of values that are packed in `own_samples_`, or the
+/// caller's.
+void Renderer::Impl::take_group(const SampleValues& samples, std::size_t first) {
+  const std::size_t count = views.size() * frame.width * frame.height;
+  own_group_.resize(impl_of(device), count);
+  if (!samples.numbers) {
+    made_exchange().give(group_of(own_samples_, first, samples.channels), count,
+                         vectors_of(own_group_, 0, k_of_group));
+    return;
   }
-  own_pixels_.download(pixels);
+  const std::size_t channels = std::min(samples.channels - first, k_of_group);
+  overwrite(own_group_, [&](std::span<cl_float4> group) {
+    for_each_in_parallel(group.size(), [&](std::size_t i) { group[i] = {}; });
+    for_each_in_parallel(samples.numbers->size(), [&](std::size_t i) {
+      std::copy_n(&samples.values[i * samples.channels + first], channels, group[(*samples.numbers)[i]].s);
+    });
+  });
 }
 
-SceneGradient Renderer::Impl::resolve_backward(std::span<const float> samples, std::size_t channels,
+/// The gradient of take_group(), in `grad_group_`, to `own_samples_`, or the caller's.
+void Renderer::Impl::give_group(const SampleValues& samples, std::size_t first, std::span<float> grad) {
+  if (!samples.numbers) {
+    made_exchange().give(vectors_of(grad_group_, 0, k_of_group), grad_group_.size(),
+                         group_of(own_samples_, first, samples.channels));
+    return;
+  }
+  const std::size_t channels = std::min(samples.channels - first, k_of_group);
+  const MappedRead group(grad_group_);
+  for_each_in_parallel(samples.numbers->size(), [&](std::size_t i) {
+    std::copy_n(group[(*samples.numbers)[i]].s, channels, &grad[i * samples.channels + first]);
+  });
+}
+
+void Renderer::Impl::resolve(const SampleValues& samples, std::span<float> pixels) {
+  see_layers(layers);
+  Device::Impl& on = impl_of(device);
+  const std::size_t channels = samples.channels, pixel_count = pixels.size() / channels;
+  std::optional<LentWrite> write;
+  if (!samples.numbers) {
+    own_samples_.resize(on, samples.values.size());
+    write.emplace(on, own_samples_.cl_buffer(), std::as_bytes(samples.values));
+  }
+  for (std::size_t first = 0; first < channels; first += k_of_group) {
+    take_group(samples, first);
+    pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
+    if (channels == k_of_group) break;
+    own_pixels_.resize(on, pixels.size());
+    made_exchange().give(vectors_of(own_image_, 0, k_of_group), pixel_count,
+                         group_of(own_pixels_, first, channels));
+  }
+  resolved_ = channels <= k_of_group ? pixel_noise->smoothed() : 0;
+  if (channels == k_of_group) {
+    own_image_.download({reinterpret_cast<cl_float4*>(pixels.data()), pixel_count});
+  } else {
+    own_pixels_.download(pixels);
+  }
+}
+
+SceneGradient Renderer::Impl::resolve_backward(const SampleValues& samples,
                                                std::span<const float> grad_pixels,
                                                std::span<float> grad_samples) {
   see_layers(layers);
   const GeometricRequest request(scene.gradients);
   Device::Impl& on = impl_of(device);
-  const std::size_t sample_count = samples.size() / channels, pixel_count = grad_pixels.size() / channels;
+  const std::size_t channels = samples.channels, pixel_count = grad_pixels.size() / channels;
   const std::size_t vertices = views.size() * frame.vertices;
-  own_samples_.resize(on, samples.size());
-  own_pixels_.resize(on, grad_pixels.size());
-  const LentWrite values(on, own_samples_.cl_buffer(), std::as_bytes(samples)),
-      grads(on, own_pixels_.cl_buffer(), std::as_bytes(grad_pixels));
-  own_group_.resize(on, sample_count);
   own_image_.resize(on, pixel_count);
+  if (!samples.numbers) own_samples_.resize(on, grad_samples.size());
+  std::optional<LentWrite> values, grads;
+  if (!samples.numbers && !samples.are_kept)
+    values.emplace(on, own_samples_.cl_buffer(), std::as_bytes(samples.values));
+  if (channels == k_of_group) {
+    grads.emplace(on, own_image_.cl_buffer(), std::as_bytes(grad_pixels));
+  } else {
+    own_pixels_.resize(on, grad_pixels.size());
+    grads.emplace(on, own_pixels_.cl_buffer(), std::as_bytes(grad_pixels));
+  }
   SceneGradient total;
-  for (std::size_t first = 0; first < channels; first += 4) {
-    const FloatVectors group = group_of(own_samples_, first, channels);
-    made_exchange().give(group, sample_count, vectors_of(own_group_, 0, 4));
-    made_exchange().give(group_of(own_pixels_, first, channels), pixel_count, vectors_of(own_image_, 0, 4));
-    pixel_noise->smooth_backward(contour_inputs(), own_group_, image_size(), own_image_, grad_group_,
+  for (std::size_t first = 0; first < channels; first += k_of_group) {
+    if (!samples.are_kept) {
+      take_group(samples, first);
+      pixel_noise->blend(own_group_, frame);
+    }
+    if (channels != k_of_group)
+      made_exchange().give(group_of(own_pixels_, first, channels), pixel_count,
+                           vectors_of(own_image_, 0, k_of_group));
+    pixel_noise->smooth_backward(contour_inputs(), image_size(), own_image_, grad_group_,
                                  aggregate.scratch(frame));
-    made_exchange().give(vectors_of(grad_group_, 0, 4), sample_count, group);
+    give_group(samples, first, grad_samples);
     grad_vertices.resize(on, vertices);
     grad_vertices.fill({});
     if (frame.clips != 0) {
@@ -172,7 +227,7 @@ SceneGradient Renderer::Impl::resolve_backward(std::span<const float> samples, s
       add(total, of_group);
     }
   }
-  own_samples_.download(grad_samples);
+  if (!samples.numbers) own_samples_.download(grad_samples);
   return total;
 }
 
@@ -208,17 +263,17 @@ void Renderer::Impl::resolve_tangent(std::span<const float> samples, std::size_t
     own_tangents_.upload(on,
                          sample_tangents.subspan(first_direction * samples.size(), count * samples.size()));
     own_pixels_.resize(on, count * of_direction);
-    for (std::size_t first = 0; first < channels; first += 4) {
+    for (std::size_t first = 0; first < channels; first += k_of_group) {
       own_group_.resize(on, sample_count);
       made_exchange().give(group_of(own_samples_, first, channels), sample_count,
-                           vectors_of(own_group_, 0, 4));
+                           vectors_of(own_group_, 0, k_of_group));
       pixel_noise->smooth(contour_inputs(), own_group_, image_size(), own_image_);
       own_group_.resize(on, count * sample_count);
       made_exchange().give(group_of(own_tangents_, first, channels), count * sample_count,
-                           vectors_of(own_group_, 0, 4));
+                           vectors_of(own_group_, 0, k_of_group));
       pixel_noise->smooth_tangent(contour_inputs(), image_size(), tangents, own_group_, own_image_,
                                   aggregate.scratch(frame));
-      made_exchange().give(vectors_of(own_image_, 0, 4), count * pixel_count,
+      made_exchange().give(vectors_of(own_image_, 0, k_of_group), count * pixel_count,
                            group_of(own_pixels_, first, channels));
     }
     own_pixels_.download(pixels.subspan(first_direction * of_direction, count * of_direction));
@@ -282,7 +337,7 @@ std::vector<float> Renderer::resolve(std::span<const float> samples, std::size_t
   m.require_samples("Renderer::resolve");
   m.require_values(samples, channels);
   std::vector<float> pixels(channels * m.pixel_count());
-  m.resolve(samples, channels, pixels);
+  m.resolve({samples, channels}, pixels);
   return pixels;
 }
 
@@ -293,7 +348,7 @@ ResolveGradient Renderer::resolve_backward(std::span<const float> samples, std::
   m.require_values(samples, channels);
   checks::require_numbers(grad_pixels, channels * m.pixel_count(), "grad_pixels (resolve)");
   ResolveGradient found{std::vector<float>(samples.size()), {}};
-  found.scene = m.resolve_backward(samples, channels, grad_pixels, found.samples);
+  found.scene = m.resolve_backward({samples, channels}, grad_pixels, found.samples);
   return found;
 }
 

@@ -112,15 +112,19 @@ void PixelNoise::blur_forward(const Blur::Size& size, const Buffer<cl_float4>& b
 
 void PixelNoise::smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
                         Buffer<cl_float4>& pixels) {
-  antialias.forward(in.p, contour, samples, other_kept_);
+  blend(samples, in.p);
   blur_forward(size, samples, pixels, true);
   blur_holds_image_ = false;
 }
 
-void PixelNoise::smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
+void PixelNoise::blend(Buffer<cl_float4>& samples, const shared::FrameParams& p) {
+  antialias.forward(p, contour, samples, other_kept_);
+  ++smoothed_;
+}
+
+void PixelNoise::smooth_backward(const ContourInputs& in, const Blur::Size& size,
                                  const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
                                  Buffer<float>& scratch) {
-  antialias.forward(in.p, contour, samples, other_kept_);
   if (sampled) {
     sampled->backward(grad_image, grad_samples);
   } else {

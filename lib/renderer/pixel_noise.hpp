@@ -84,11 +84,13 @@ class PixelNoise {
   void smooth(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
               Buffer<cl_float4>& pixels);
 
-  /// From the gradient of what smooth() made of samples to theirs, and to the contours' ends. `samples` are as smooth()
-  /// took them, and are blended again.
-  void smooth_backward(const ContourInputs& in, Buffer<cl_float4>& samples, const Blur::Size& size,
-                       const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
-                       Buffer<float>& scratch);
+  /// The part of smooth() that smooth_backward() and smooth_tangent() need: blends samples in place.
+  void blend(Buffer<cl_float4>& samples, const shared::FrameParams& p);
+  /// Number of the samples that smooth() and blend() took last: others have another. Never 0 after them.
+  std::uint64_t smoothed() const { return smoothed_; }
+  /// From the gradient of what smooth() made of the last samples to theirs, and to the contours' ends.
+  void smooth_backward(const ContourInputs& in, const Blur::Size& size, const BufferRef<cl_float4>& grad_image,
+                       Buffer<cl_float4>& grad_samples, Buffer<float>& scratch);
 
   /// From the tangents of the samples that smooth() took last, which are blended in place, to those of its pixels,
   /// along a group's directions.
@@ -125,6 +127,7 @@ class PixelNoise {
 
  private:
   KeptSamples kept_, other_kept_;
+  std::uint64_t smoothed_ = 0;
   Buffer<cl_float4> grad_raster_;  // where it has not taken the raster's place
   Buffer<cl_float4> kept_grad_;    // of a whole frame's samples; see room()
   bool is_blended_ = false;        // the raster is

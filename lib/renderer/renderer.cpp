@@ -163,6 +163,7 @@ void Renderer::Impl::finish_image() {
   if (shown_normals) blend_normals();
   if (!defers_image()) pixel_noise->forward(contour_inputs(), aggregate.image, image_size());
   seen_layers_ = front_layers();
+  resolved_ = 0;
 }
 
 void Renderer::Impl::forward_within(const FrameCounts& expected, FrameSizes sizes) {

@@ -71,6 +71,14 @@ enum class FrameSizes { read, kept };
 
 class RowReads;
 
+/// What the caller has shaded: packed values of all samples, or of those with these numbers, where the others are 0.
+struct SampleValues {
+  std::span<const float> values;
+  std::size_t channels;
+  const std::vector<cl_uint>* numbers = nullptr;  // none: all
+  bool are_kept = false;                          // values are left out: they are those that resolve() took last
+};
+
 /// Elements of a buffer.
 struct DeviceGradient {
   const Buffer<cl_float4>& values;
@@ -144,9 +152,12 @@ struct Renderer::Impl : OnDevice, ViewSet {
   using WritePlaces = std::function<void(std::span<cl_float4>)>;
   SceneGradient samples_backward(const WritePlaces& write);
   void require_values(std::span<const float> samples, std::size_t channels) const;
-  void resolve(std::span<const float> samples, std::size_t channels, std::span<float> pixels);
-  SceneGradient resolve_backward(std::span<const float> samples, std::size_t channels,
-                                 std::span<const float> grad_pixels, std::span<float> grad_samples);
+  void resolve(const SampleValues& samples, std::span<float> pixels);
+  /// Kept values only after holds_resolved().
+  SceneGradient resolve_backward(const SampleValues& samples, std::span<const float> grad_pixels,
+                                 std::span<float> grad_samples);
+  /// True if what resolve_backward() needs of the last values is there.
+  bool holds_resolved() const;
   SamplesTangent samples_tangent(std::span<const SceneTangent> directions);
   void resolve_tangent(std::span<const float> samples, std::size_t channels,
                        std::span<const float> sample_tangents, std::span<const SceneTangent> directions,
@@ -314,6 +325,8 @@ struct Renderer::Impl : OnDevice, ViewSet {
 
   SceneGradient finish_geometric_gradient();
   void see_layers(cl_uint count);
+  void take_group(const SampleValues& samples, std::size_t first);
+  void give_group(const SampleValues& samples, std::size_t first, std::span<float> grad);
   /// For Antialias::find_front() of the library's own shading.
   cl_uint front_layers() const { return sees_through() ? 0 : 1; }
   void upload_directions(std::span<const SceneTangent> directions);
@@ -333,6 +346,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   cl_uint seen_layers_ = 1;         // through which the last frame's contours are seen: see find_front()
   Buffer<float> own_samples_, own_pixels_, own_tangents_;  // of the caller's shading, packed
   Buffer<cl_float4> own_group_, own_image_, grad_group_;   // four of their channels
+  std::uint64_t resolved_ = 0;  // PixelNoise::smoothed() of the last resolve() of at most so many
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
   Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;

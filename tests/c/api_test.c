@@ -862,6 +862,86 @@ static void test_frame_tangents(void) {
   dpr_frame_destroy(frame);
 }
 
+/* Of the samples with a face alone, in a frame whose samples these are: as of all samples. */
+static void check_covered(dpr_frame* frame, const dpr_array* samples, size_t seen) {
+  static float images[FLOATS], of_all_images[FLOATS], weights[FLOATS];
+  const size_t h = samples->shape[1], w = samples->shape[2], all = h * w;
+  const int64_t* const faces_seen = samples[0].data;
+  float table[12], grad_table[12], of_all_table[12], by_table[9], of_all[9], by_contours[9], again[9];
+  float *const rows = calloc(4 * seen, sizeof(float)), *const grad_rows = malloc(4 * seen * sizeof(float));
+  float *const kept_rows = malloc(4 * seen * sizeof(float)), *const whole = malloc(4 * all * sizeof(float));
+  float *const grad_whole = malloc(4 * all * sizeof(float)), *const grad_places = malloc(3 * all * sizeof(float));
+  int32_t of_faces[] = {0, 1, 2};
+  const dpr_array attributes = {"attributes", table, DPR_FLOAT32, 2, {3, 4}};
+  const dpr_array at_samples[] = {samples[0], samples[1], attributes, {"faces", of_faces, DPR_INT32, 2, {1, 3}}};
+  const dpr_array values = {"values", rows, DPR_FLOAT32, 2, {seen, 4}};
+  const dpr_array grad_values = {"values", grad_rows, DPR_FLOAT32, 2, {seen, 4}};
+  const dpr_array kept_values = {"values", kept_rows, DPR_FLOAT32, 2, {seen, 4}};
+  const dpr_array of_samples = {"values", whole, DPR_FLOAT32, 4, {1, h, w, 4}};
+  const dpr_array grad_of_samples = {"values", grad_whole, DPR_FLOAT32, 4, {1, h, w, 4}};
+  const dpr_array image = {"images", images, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array whole_image = {"images", of_all_images, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array grad = {"images", weights, DPR_FLOAT32, 4, {1, SIDE, SIDE, 4}};
+  const dpr_array grads[] = {{"attributes", of_all_table, DPR_FLOAT32, 2, {3, 4}},
+                             {"barycentrics", grad_places, DPR_FLOAT32, 4, {1, h, w, 3}}};
+  dpr_array by_values = {"attributes", grad_table, DPR_FLOAT32, 2, {3, 4}}, wrong = values;
+  dpr_array gradient = {"vertices", by_table, DPR_FLOAT32, 2, {3, 3}};
+  size_t count = 0, k, row = 0;
+  int i;
+  for (i = 0; i < 12; ++i) table[i] = cosf(1.3f * (float)i);
+  for (i = 0; i < FLOATS; ++i) weights[i] = sinf(0.3f * (float)i);
+  OK(dpr_frame_covered(frame, &count));
+  EXPECT(count == seen);
+  OK(dpr_frame_interpolate(frame, &attributes, 1, &values));
+  OK(dpr_interpolate(at_samples, 4, &of_samples, 1));
+  for (k = 0; k < all; ++k) {
+    if (faces_seen[k] < 0) continue;
+    for (i = 0; i < 4; ++i) EXPECT(rows[4 * row + (size_t)i] == whole[4 * k + (size_t)i]);
+    ++row;
+  }
+  OK(dpr_frame_resolve(frame, &of_samples, &whole_image));
+  OK(dpr_frame_resolve(frame, &values, &image));
+  for (i = 0; i < FLOATS; ++i) EXPECT(images[i] == of_all_images[i]);
+
+  /* By contours: of the values that were resolved last, of the same given again, and of all. */
+  gradient.data = by_contours;
+  OK(dpr_frame_resolve_backward(frame, NULL, &grad, &kept_values, &gradient, 1));
+  gradient.data = again;
+  OK(dpr_frame_resolve_backward(frame, &values, &grad, &grad_values, &gradient, 1));
+  gradient.data = of_all;
+  OK(dpr_frame_resolve_backward(frame, &of_samples, &grad, &grad_of_samples, &gradient, 1));
+  for (i = 0; i < 9; ++i) EXPECT(by_contours[i] == again[i] && again[i] == of_all[i]);
+  for (k = row = 0; k < all; ++k) {
+    if (faces_seen[k] < 0) continue;
+    for (i = 0; i < 4; ++i, ++row)
+      EXPECT(kept_rows[row] == grad_rows[row] && grad_rows[row] == grad_whole[4 * k + (size_t)i]);
+  }
+  REFUSED(dpr_frame_resolve_backward(frame, NULL, &grad, &grad_values, &gradient, 1), "values");
+
+  /* By places on the faces. */
+  gradient.data = by_table;
+  OK(dpr_frame_interpolate_backward(frame, &attributes, 1, &grad_values, &by_values, &gradient, 1));
+  {
+    const dpr_array grad_at = {"values", grad_whole, DPR_FLOAT32, 4, {1, h, w, 4}};
+    OK(dpr_interpolate_backward(at_samples, 4, &grad_at, 1, grads, 2));
+  }
+  gradient.data = of_all;
+  OK(dpr_frame_samples_backward(frame, grads + 1, 1, &gradient, 1));
+  for (i = 0; i < 9; ++i) EXPECT(by_table[i] != 0 && by_table[i] == of_all[i]);
+  for (i = 0; i < 12; ++i) EXPECT(fabsf(grad_table[i] - of_all_table[i]) < 1e-5f * (1 + fabsf(grad_table[i])));
+
+  wrong.shape[0] = seen + 1;
+  REFUSED(dpr_frame_resolve(frame, &wrong, &image), "samples with a face");
+  REFUSED(dpr_frame_interpolate(frame, &attributes, 1, &wrong), "samples with a face");
+  REFUSED(dpr_frame_interpolate(frame, samples, 1, &values), "attributes");
+  wrong = by_values, wrong.shape[0] = 2;
+  REFUSED(dpr_frame_interpolate_backward(frame, &attributes, 1, &grad_values, &wrong, &gradient, 1), "attributes");
+  rows[0] = NAN;
+  REFUSED(dpr_frame_resolve(frame, &values, &image), "finite");
+  REFUSED(dpr_frame_covered(frame, NULL), "count");
+  free(rows), free(grad_rows), free(kept_rows), free(whole), free(grad_whole), free(grad_places);
+}
+
 /* Shading of the caller's own: white samples make the frame's own image and its gradients. */
 static void test_frame_samples(void) {
   static float pixels[FLOATS], images[FLOATS], weights[FLOATS], other[2 * FLOATS];
@@ -919,6 +999,7 @@ static void test_frame_samples(void) {
       seen += faces_seen[k] == 0;
     }
     EXPECT(seen > 0 && seen < count);
+    check_covered(frame, samples, seen);
     OK(dpr_frame_resolve(frame, &shaded, &resolved));
     for (i = 0; i < FLOATS; ++i) EXPECT(fabsf(images[i] - pixels[i]) < 1e-5f);
     gradient.data = by_contours;

@@ -319,6 +319,24 @@ class OwnShadingTest(unittest.TestCase):
             gradients.append([image.detach(), *torch.autograd.grad((image * weights).sum(), leaves)])
         for found, wanted in zip(*gradients):
             self.check_close(found, wanted, 1e-6)
+        second = []
+        for covered in (False, True):  # of a square of each value, by the attributes
+            samples = RENDERER.rasterize(leaves[0].detach(), torch.from_numpy(FACES), self.views, self.intrinsics)
+            values = samples.interpolate(leaves[1], covered=covered)
+            first, = torch.autograd.grad(values.square().sum(), leaves[1], create_graph=True)
+            second.append(torch.autograd.grad(first.square().sum(), leaves[1])[0])
+        self.check_close(*second, 1e-5)
+        # Several images of one frame, in whatever order they are differentiated.
+        def resolved(*numbers):
+            samples = RENDERER.rasterize(leaves[0], torch.from_numpy(FACES), self.views, self.intrinsics)
+            values = samples.interpolate(leaves[1], covered=True)
+            return [samples.resolve((values, torch.cat((values, values), -1), values * values)[i])[..., :3] for i in numbers]
+
+        images = resolved(0, 1, 2)
+        for i in (2, 0, 1, 2):
+            found = torch.autograd.grad((images[i] * weights).sum(), leaves, retain_graph=True)
+            for ours, alone in zip(found, torch.autograd.grad((resolved(i)[0] * weights).sum(), leaves)):
+                self.check_close(ours, alone, 1e-6)
         with self.assertWarns(UserWarning):
             nothing = RENDERER.rasterize(leaves[0][:0], torch.zeros(0, 3, dtype=torch.int64), self.views, self.intrinsics)
         rows = nothing.interpolate(torch.zeros(0, 3), covered=True)

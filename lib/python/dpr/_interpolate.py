@@ -28,6 +28,30 @@ class _Interpolate(torch.autograd.Function):
         return (None, None, *(next(found) if is_wanted else None for is_wanted in wanted), None)
 
 
+class _Covered(torch.autograd.Function):
+    """(Rasterized, formula, faces or None, attributes, tensors of the call) to the values [M, C] of the samples with a face.
+    The formula makes the same of the attributes in PyTorch's operations."""
+
+    @staticmethod
+    def forward(ctx, rasterized, mixed, faces, attributes, *tensors):
+        ctx.rasterized, ctx.mixed, ctx.faces = rasterized, mixed, faces
+        ctx.save_for_backward(attributes, *tensors)
+        return torch.from_numpy(rasterized.interpolate(_arrays.to_numpy(attributes), faces))
+
+    @staticmethod
+    def backward(ctx, grad):
+        attributes, *tensors = ctx.saved_tensors
+        wanted = ctx.needs_input_grad[3:]
+        if torch.is_grad_enabled():  # of a derivative that is to have one itself
+            given = [tensor for tensor, is_wanted in zip((attributes, *tensors), wanted) if is_wanted]
+            found = iter(torch.autograd.grad(ctx.mixed(attributes), given, grad, create_graph=True, allow_unused=True))
+            return (None, None, None, *(next(found) if is_wanted else None for is_wanted in wanted))
+        of_attributes, found = ctx.rasterized.interpolate_gradients(_arrays.to_numpy(attributes), ctx.faces,
+                                                                    _arrays.to_numpy(grad))
+        of_tensors = (torch.from_numpy(found[i]) if i in found else None for i in range(len(tensors)))
+        return (None, None, None, torch.from_numpy(of_attributes), *of_tensors)
+
+
 def _is_transformed(*tensors):
     """Within torch.func, or with tangents: the library knows nothing of these."""
     peek = getattr(getattr(torch._C, "_functorch", None), "peek_interpreter_stack", None)
@@ -39,3 +63,9 @@ def interpolate(face_id, barycentrics, attributes, faces, mixed):
     if _is_transformed(barycentrics, attributes):
         return mixed(barycentrics, attributes, faces)
     return _Interpolate.apply(mixed, face_id, barycentrics, attributes, faces)
+
+
+def interpolate_covered(rasterized, mixed, faces, attributes, tensors):
+    if _is_transformed(attributes, *tensors):
+        return mixed(attributes)
+    return _Covered.apply(rasterized, mixed, faces, attributes, *tensors)

@@ -9,6 +9,7 @@ import numpy as np
 from . import _arrays, _frames, _library, _merged
 
 _NAMES = ("face_id", "barycentrics", "depth")
+_KEPT_CHANNELS = 4  # of values that the library keeps for the pass back
 
 
 class Rasterized:
@@ -18,7 +19,7 @@ class Rasterized:
     def __init__(self, spec, arrays, wanted):
         """arrays, wanted: as Rendered has them."""
         arrays = [np.ascontiguousarray(array).reshape(array.shape) for array in arrays]
-        self.leaves, self._shapes = wanted, [array.shape for array in arrays]
+        self.leaves, self._shapes, self._resolved = wanted, [array.shape for array in arrays], None
         self._lot, self._frame = _rendered(spec, arrays, wanted)
         # Of a frame that shows nothing.
         self.warning = _frames.NOTHING_RENDERED if self._frame.is_empty() else None
@@ -77,20 +78,62 @@ class Rasterized:
                 of_all[layer] = _checked(name, grad, of_all.shape[1:])
         return self.gradients(whole)
 
+    @functools.cached_property
+    def covered_count(self):
+        """Samples of the nearest layer with a face."""
+        count = ctypes.c_size_t()
+        _library.call("dpr_frame_covered", self._frame.handle, ctypes.byref(count))
+        return count.value
+
+    @_arrays.named("dpr.Samples")
+    def interpolate(self, attributes, faces):
+        """[M, C] at these samples. faces: None for those of the mesh."""
+        values = np.empty((self.covered_count, attributes.shape[-1]), np.float32)
+        _library.call("dpr_frame_interpolate", self._frame.handle, *_frames.c_arrays(_table(attributes, faces)),
+                      _one("values", values))
+        return values
+
+    def interpolate_gradients(self, attributes, faces, grad):
+        """(gradient of the attributes, {leaf: gradient})"""
+        table, grad = _table(attributes, faces), np.ascontiguousarray(grad)
+        grad_attributes = np.empty(table[0][1].shape, np.float32)
+        found = self._gradients("dpr_frame_interpolate_backward", *_frames.c_arrays(table), _one("grad_values", grad),
+                                _one("grad_attributes", grad_attributes))
+        return grad_attributes.reshape(attributes.shape), found
+
     def resolve(self, values):
-        values = _checked("values", values, (*self.size, values.shape[-1] if values.ndim == 4 else 0))
+        values = self._checked_values(values)
         images = np.empty((*self._image_size, values.shape[-1]), np.float32)
         _library.call("dpr_frame_resolve", self._frame.handle, _one("values", values), _one("images", images))
+        self._resolved = values if values.shape[-1] <= _KEPT_CHANNELS else None
         return images
 
     def resolve_gradients(self, values, grad_images):
         """(gradient of the values, {leaf: gradient})"""
-        values = _checked("values", values, (*self.size, values.shape[-1]))
+        values = self._checked_values(values)
         grad_images = _checked("gradient of the images", grad_images, (*self._image_size, values.shape[-1]))
         grad_values = np.empty(values.shape, np.float32)
-        found = self._gradients("dpr_frame_resolve_backward", _one("values", values), _one("grad_images", grad_images),
-                                _one("grad_values", grad_values))
+        is_kept = self._resolved is not None and values.ctypes.data == self._resolved.ctypes.data and \
+            values.shape == self._resolved.shape
+        if not is_kept:
+            self._resolved = None
+        found = self._gradients("dpr_frame_resolve_backward", None if is_kept else _one("values", values),
+                                _one("grad_images", grad_images), _one("grad_values", grad_values))
         return grad_values, found
+
+    def _checked_values(self, values):
+        """Packed floats of all samples, or of those with a face. Fails for another shape."""
+        if values.ndim == 2 and (len(values) != self.covered_count or values.shape[-1] == 0):
+            _arrays.fail(ValueError, "values", list(values.shape), shapes_of_values(self.size, self.covered_count), "dpr.Samples")
+        if values.ndim == 2:
+            return np.ascontiguousarray(_arrays.to_numpy(values), np.float32)
+        return _checked("values", values, (*self.size, values.shape[-1] if values.ndim == 4 else 0))
+
+    def of_all(self, values):
+        """Values [..., N, h, w, C] of those of the samples with a face, [..., M, C]; 0 where nothing is."""
+        found = np.zeros((*values.shape[:-2], int(np.prod(self.size)), values.shape[-1]), np.float32)
+        found[..., np.flatnonzero(self.outputs[0][0] >= 0), :] = values
+        return found.reshape(*values.shape[:-2], *self.size, values.shape[-1])
 
     def tangents(self, given):
         """Tangents [K, *output.shape] of barycentrics and depth along {leaf: [K, ...]} of arrays that were wanted."""
@@ -105,9 +148,12 @@ class Rasterized:
     def resolve_tangents(self, count, values, value_tangents, given):
         """Tangents [count, N, height, width, C] of resolve(values), along {leaf: [count, ...]} of arrays that were wanted.
         value_tangents: [count, *values.shape], or None where the values stay."""
-        values = _checked("values", values, (*self.size, values.shape[-1]))
+        values = self._checked_values(values)
         moved = np.zeros((count, *values.shape), np.float32) if value_tangents is None else \
-            _checked("tangents of values", value_tangents, (count, *values.shape))
+            _checked("tangents of values", value_tangents, (count, *values.shape), is_empty=True)
+        if values.ndim == 2:
+            values, moved = self.of_all(values), self.of_all(moved)
+        self._resolved = None
         images = np.empty((count, *self._image_size, values.shape[-1]), np.float32)
         moving = self._moving(count, given)
         _library.call("dpr_frame_resolve_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
@@ -178,12 +224,25 @@ def _one(name, array):
     return _frames.c_arrays([(name, array)])[0]
 
 
-def _checked(name, array, shape):
+def shapes_of_values(size, covered):
+    """Those of samples' values, in words."""
+    return f"{[*size, 'C']}, or [{covered}, C] of the samples with a face".replace("'", "")
+
+
+def _table(attributes, faces):
+    """Arrays of attributes [V, C] or [N, V, C], and faces or None, as the library takes them."""
+    if attributes.ndim == 3 and len(attributes) == 1:
+        attributes = attributes[0]
+    arrays = [("attributes", attributes)] + ([] if faces is None else [("faces", faces.clip(0))])
+    return [(name, np.ascontiguousarray(array)) for name, array in arrays]
+
+
+def _checked(name, array, shape, is_empty=False):
     """Packed floats. Fails for another shape."""
     array = _arrays.from_numbers(array)
     _arrays.require_array(name, array, "dpr.Samples")
     array = np.ascontiguousarray(_arrays.to_numpy(array), np.float32)
-    if array.shape != shape or not array.size:
+    if array.shape != shape or not (array.size or is_empty):
         _arrays.fail(ValueError, name, list(array.shape), f"[{', '.join(str(size or 'C') for size in shape)}]", "dpr.Samples")
     return array
 

@@ -7,7 +7,7 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from . import _arrays, _numpy
+from . import _arrays, _numpy, _rasterized
 from ._rasterized import Rasterized, interpolated
 
 Array = Any
@@ -37,29 +37,50 @@ class Samples:
         gradient = by_contours["vertices"] + inside["vertices"]
     """
 
-    face_id: Array
-    barycentrics: Array
-    depth: Array
     supersampling: int
     margin: int
 
-    def __init__(self, rasterized, outputs, faces, plan, tensors, layer=0):
-        self._rasterized, self._faces, self._plan, self._tensors, self._layer = rasterized, faces, plan, tensors, layer
-        self.face_id, self.barycentrics, self.depth = (output[layer] for output in outputs)
+    def __init__(self, rasterized, read, plan, tensors, kind, layer=0):
+        """read: finds [face_id, barycentrics, depth] of all layers, once; kind: the library of their arrays"""
+        self._rasterized, self._read, self._plan, self._tensors, self._layer = rasterized, read, plan, tensors, layer
+        self._kind, self._is_of_jax = kind, kind == "jax"
         self.supersampling, self.margin = rasterized.raster.supersampling, rasterized.raster.margin
-        self._outputs, self._is_of_list = outputs, ("faces",) not in plan.paths
+        self._is_of_list = ("faces",) not in plan.paths
         # Of each mesh: numbers of vertices, and the faces' shape.
         self._meshes = list(zip([array.shape[-2] for array in _of_name(plan, plan.given, "vertices")],
                                 [tuple(array.shape) for array in _of_name(plan, plan.given, "faces")]))
 
+    @functools.cached_property
+    def face_id(self) -> Array:
+        return self._read()[0][self._layer]
+
+    @functools.cached_property
+    def barycentrics(self) -> Array:
+        return self._read()[1][self._layer]
+
+    @functools.cached_property
+    def depth(self) -> Array:
+        return self._read()[2][self._layer]
+
+    @functools.cached_property
+    def _faces(self):
+        """[F, 3] or [N, F, 3] of the samples' library."""
+        faces = _of_name(self._plan, self._plan.leaves, "faces")
+        if self._is_of_jax:
+            faces = [sys.modules["jax"].numpy.asarray(own) for own in faces]
+        elif self._tensors is not None:
+            faces = [sys.modules["torch"].as_tensor(own).long() for own in faces]
+        return _arrays.padded(faces) if self._is_of_list else faces[0]
+
     @property
-    def _is_of_jax(self):
-        return _arrays.module_of(self.depth) == "jax"
+    def _size(self):
+        """(N, h, w)"""
+        return tuple(self.face_id.shape) if self._is_of_jax else self._rasterized.size
 
     @property
     def layers(self) -> Tuple[Samples, ...]:
         """Samples of each layer, the nearest first, as many as rasterize() was asked for."""
-        return tuple(Samples(self._rasterized, self._outputs, self._faces, self._plan, self._tensors, layer)
+        return tuple(Samples(self._rasterized, self._read, self._plan, self._tensors, self._kind, layer)
                      for layer in range(self._rasterized.raster.layers))
 
     @property
@@ -75,11 +96,24 @@ class Samples:
         jax.jit(), which knows no M. Raises ValueError for other shapes and indices."""
         if not isinstance(covered, (bool, np.bool_)):
             _arrays.fail(TypeError, "covered", type(covered).__name__, "True or False", "dpr.Samples")
-        attributes, faces = self._tables_of(attributes, faces)
-        if covered:
-            found = self._interpolated(*self._covered_alone(attributes, faces))
-            return found.reshape(found.shape[-2:])
-        return self._interpolated(self.face_id, self.barycentrics, attributes, faces)
+        attributes, own = self._tables_of(attributes, faces)
+        if not covered:
+            return self._interpolated(self.face_id, self.barycentrics, attributes, self._faces if own is None else own)
+        if self._is_of_jax or self._layer > 0 or 0 in attributes.shape:
+            return self._mixed_alone(own, attributes)
+        if own is None and self._is_of_list:  # which the frame may have otherwise
+            own = self._faces
+        table = None if own is None else _arrays.to_numpy(own)
+        if self._tensors is not None:
+            from . import _interpolate
+            mixed = functools.partial(self._mixed_alone, own)
+            return _interpolate.interpolate_covered(self._rasterized, mixed, table, attributes, self._tensors)
+        return _arrays.like(attributes, self._rasterized.interpolate(_arrays.to_numpy(attributes), table))
+
+    def _mixed_alone(self, faces, attributes):
+        """Attributes at the samples with a face, [M, C], by operations of the arrays' library."""
+        found = self._interpolated(*self._covered_alone(attributes, self._faces if faces is None else faces))
+        return found.reshape(found.shape[-2:])
 
     def _interpolated(self, face_id, barycentrics, attributes, faces):
         mixed = functools.partial(self._mixed, face_id)
@@ -105,7 +139,7 @@ class Samples:
 
     def _covered_alone(self, attributes, faces):
         """face_id and barycentrics [1, 1, M, ...] of the samples with a face, and tables of all views' vertices and faces."""
-        count, h, w = self.face_id.shape
+        count, h, w = self._size
         ids, barycentrics = (_arrays.rows(array.reshape(count * h * w, *array.shape[3:]), self._covered)[None, None]
                              for array in (self.face_id, self.barycentrics))
         if attributes.ndim == 3 or faces.ndim == 3:
@@ -121,11 +155,12 @@ class Samples:
         if self._is_of_jax:
             _arrays.fail(TypeError, "interpolate_steps()", "samples of JAX", "those of other arrays", "dpr.Samples")
         steps = _arrays.like(self.depth, self._rasterized.steps[self._layer])
-        corners = self._at_corners(self.face_id, *self._tables_of(attributes, faces))
+        attributes, faces = self._tables_of(attributes, faces)
+        corners = self._at_corners(self.face_id, attributes, self._faces if faces is None else faces)
         return (steps[..., None, :] * corners[..., None]).sum(-3)
 
     def _tables_of(self, attributes, faces):
-        """What was given as attributes [V, C] or [N, V, C], and faces."""
+        """What was given as attributes [V, C] or [N, V, C], and faces or None."""
         attributes, faces = _arrays.from_numbers(attributes), _arrays.from_numbers(faces, True)
         if isinstance(attributes, (list, tuple)) and self._is_of_list:
             attributes, faces = self._tables(attributes, faces)
@@ -133,10 +168,11 @@ class Samples:
             counts = {vertices for vertices, _ in self._meshes}
             if len(counts) > 1 and faces is None and len(getattr(attributes, "shape", ())) == 2:
                 _arrays.fail(ValueError, "attributes", list(attributes.shape), f"a list of {len(self._meshes)}", "dpr.Samples")
-            attributes, faces = self._table("", attributes, faces, max(counts), tuple(self._faces.shape))
+            shape = tuple(self._faces.shape) if self._is_of_list else self._meshes[0][1]
+            attributes, faces = self._table("", attributes, faces, max(counts), shape)
         if faces is not None and self._tensors is not None and not self._is_of_jax:
             faces = sys.modules["torch"].as_tensor(faces).long()
-        return attributes, self._faces if faces is None else faces
+        return attributes, faces
 
     def _at_corners(self, face_id, attributes, faces):
         """[N, h, w, 3, C], or what broadcasts to it: attributes of the corners of the samples' faces."""
@@ -157,7 +193,7 @@ class Samples:
                 _arrays.fail(ValueError, "faces" + which, list(faces.shape), list(shape_of_faces), "dpr.Samples")
             bounds = faces.clip(0) if faces.ndim == 3 else faces
             rows, least = (int(bounds.max()) + 1, int(bounds.min())) if 0 not in shape_of_faces else (0, 0)
-        shape, count = tuple(attributes.shape), len(self.face_id)
+        shape, count = tuple(attributes.shape), self._size[0]
         is_table = len(shape) == 2 or len(shape) == 3 and shape[0] in (1, count) and not which
         if not is_table or least < 0 or shape[-2] < rows or faces is None and shape[-2] != rows:
             wanted = str(rows) if faces is None else f"rows for indices from {least} to {rows - 1}"
@@ -194,7 +230,7 @@ class Samples:
         if getattr(array, "requires_grad", False):
             _arrays.fail(ValueError, name, "a tensor that requires a gradient", "an array without, as rasterize() was given no "
                          "tensors: resolve_with_vjp() and pullback() have gradients", "dpr.Samples")
-        return _arrays.to_numpy(array) if isinstance(self.barycentrics, np.ndarray) else array
+        return _arrays.to_numpy(array) if self._kind == "numpy" else array
 
     def resolve(self, values: Array) -> Array:
         """Images [N, height, width, C] of values of the samples, [N, h, w, C] with any number of channels: blended across
@@ -203,7 +239,7 @@ class Samples:
         channel of ones becomes alpha, which wants clamping. Contours count that fewer surfaces hide than there are layers:
         whichever layer's resolve() is called. Beside contours samples are continued, so that images may leave the values'
         range. Raises ValueError for another shape, and what is not finite."""
-        values = self._of_all(self._of_my_kind("values", values))
+        values = self._for_frame(self._of_my_kind("values", values))
         if self._is_of_jax:
             from . import _jax
             return _jax.resolve(self._rasterized, values, self._tensors)
@@ -212,26 +248,28 @@ class Samples:
             return _torch.resolve(self._rasterized, values, self._tensors)
         return _arrays.like(values, self._rasterized.resolve(_arrays.to_numpy(values)))
 
-    def _of_all(self, values):
-        """Values of all samples, 0 where nothing is, of those of the samples with a face."""
-        size = self.face_id.shape
+    def _for_frame(self, values):
+        """Values of all samples, 0 where nothing is, of those of the samples with a face; the library takes the nearest
+        layer's as they are."""
+        if values.ndim == 2 and not self._is_of_jax and self._layer == 0 or values.ndim not in (2, 4):
+            return values
         if values.ndim == 4:
             return values
-        if values.ndim != 2 or len(values) != len(self._covered) or values.shape[-1] == 0:
-            expected = f"{[*size, 'C']}, or [{len(self._covered)}, C] of the samples with a face".replace("'", "")
-            _arrays.fail(ValueError, "values", list(values.shape), expected, "dpr.Samples")
-        return _arrays.spread(values, self._covered, int(np.prod(size))).reshape(*size, values.shape[-1])
+        if len(values) != len(self._covered) or values.shape[-1] == 0:
+            _arrays.fail(ValueError, "values", list(values.shape), _rasterized.shapes_of_values(self._size, len(self._covered)),
+                         "dpr.Samples")
+        return _arrays.spread(values, self._covered, int(np.prod(self._size))).reshape(*self._size, values.shape[-1])
 
     def resolve_with_vjp(self, values: Array) -> Tuple[Array, Callable[[Array], Tuple[Array, Dict[str, Array]]]]:
         """(resolve(values), pullback). pullback(grad_images) returns the gradient of the values and, by way of the
         contours, those of vertices, views and intrinsics, by name; of tensors, of those that required a gradient."""
         self._require_numpy("resolve_with_vjp()")
         given = _kept(values)
-        kept = self._of_all(given)
+        kept = self._for_frame(given)
 
         def pullback(grad_images):
             grad_values, found = self._rasterized.resolve_gradients(kept, grad_images)
-            if given.ndim == 2:
+            if grad_values.ndim > given.ndim:
                 grad_values = _arrays.rows(grad_values.reshape(-1, given.shape[-1]), self._covered)
             return _arrays.like(values, grad_values), self._by_name(found)
 
@@ -266,13 +304,13 @@ class Samples:
         jvp() takes them; of both, those left out stay."""
         self._require_numpy("resolve_with_jvp()")
         own = _kept(values)
-        kept = self._of_all(own)
+        kept = self._for_frame(own)
         if value_tangents is not None:
             value_tangents = _kept(value_tangents, "tangents of values")
             if value_tangents.shape[1:] != own.shape or len(value_tangents) == 0:
                 _arrays.fail(ValueError, "tangents of values", list(value_tangents.shape),
                              f"[K, {', '.join(map(str, own.shape))}]", "dpr.Samples")
-            value_tangents = np.stack([self._of_all(moved) for moved in value_tangents])
+            value_tangents = np.stack([self._for_frame(moved) for moved in value_tangents])
         if value_tangents is None and tangents is None:
             _arrays.fail(ValueError, "tangents", "none", "those of the values, or of one array at least", "dpr.Samples")
         count, given = (len(value_tangents), {}) if tangents is None else self._moving(tangents)
@@ -301,18 +339,16 @@ def rasterize(spec, plan, copy):
     """Samples of a call's meshes."""
     leaves, tensors = plan.leaves, None
     kinds = {_arrays.module_of(leaf) for leaf in leaves}
-    faces = _of_name(plan, leaves, "faces")
-    if "torch" in kinds:
+    kind = next((name for name in ("torch", "jax") if name in kinds), _arrays.module_of(plan.given[0]))
+    if kind == "torch":
         from . import _torch
-        rasterized, outputs, tensors = _torch.rasterize(spec, leaves, copy)
-        faces = [sys.modules["torch"].as_tensor(own).long() for own in faces]
-    elif "jax" in kinds:
+        rasterized, read, tensors = _torch.rasterize(spec, leaves, copy)
+    elif kind == "jax":
         from . import _jax
         rasterized, outputs, tensors = _jax.rasterize(spec, leaves)
-        faces = [sys.modules["jax"].numpy.asarray(own) for own in faces]
+        read = functools.partial(tuple, outputs)
     else:
         wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
         rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
-        outputs = [_arrays.like(plan.given[0], output) for output in rasterized.outputs]
-    faces = faces[0] if ("faces",) in plan.paths else _arrays.padded(faces)
-    return Samples(rasterized, outputs, faces, plan, tensors)
+        read = functools.lru_cache(None)(lambda: [_arrays.like(plan.given[0], output) for output in rasterized.outputs])
+    return Samples(rasterized, read, plan, tensors, kind)

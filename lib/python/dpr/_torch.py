@@ -203,13 +203,29 @@ class _ResolveGradients(Derivative):
         return tuple(_tensor(array) for array in (grad_values, *(found[i] for i in rasterized.leaves)))
 
 
-@one_forward
 class _Rasterize(_OfOneCall):
-    """(tensors of a call) to face_id, barycentrics and depth."""
+    """(tensors of a call) to nothing: leaves the frame to the call. For torch.func, whose tensors have memory in here alone."""
 
     @staticmethod
     def forward(call, *tensors):
         call.rendered = Rasterized(call.spec, [_arrays.to_numpy(tensor) for tensor in tensors], call.wanted)
+        return torch.empty(0)
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        ctx.mark_non_differentiable(output)
+
+    @staticmethod
+    def jvp(ctx, *_):
+        return None
+
+
+@one_forward
+class _Read(_OfOneCall):
+    """(tensors of a call) to face_id, barycentrics and depth of its frame."""
+
+    @staticmethod
+    def forward(call, *tensors):
         return tuple(_tensor(array) for array in call.rendered.outputs)
 
     @staticmethod
@@ -267,13 +283,13 @@ class _Resolve(_OfOneCall):
 
 
 def rasterize(spec, leaves, copy):
-    """(Rasterized, its outputs, the tensors that resolve() depends on)"""
+    """(Rasterized, what reads its outputs, the tensors that resolve() depends on)"""
     tensors = [leaf if isinstance(leaf, torch.Tensor) else torch.from_dlpack(_arrays.to_numpy(leaf)) for leaf in leaves]
     if copy:
         tensors = [tensor.cpu() for tensor in tensors]
     call = _Call(spec, tuple(i for i, tensor in enumerate(tensors) if _is_wanted(tensor)))
-    outputs = _Rasterize.apply(call, *tensors)
-    return call.rendered, outputs, tensors
+    _Rasterize.apply(call, *tensors) if _HAS_CONTEXT else _Rasterize.forward(call, *tensors)
+    return call.rendered, functools.lru_cache(None)(lambda: _Read.apply(call, *tensors)), tensors
 
 
 def resolve(rasterized, values, tensors):

@@ -62,9 +62,12 @@ def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
     have them. 0 where a vertex has no face with area."""
     _require("vertices", vertices, (3,), "[V, 3] or [N, V, 3]")
     _require("faces", faces, (3,), "[F, 3]")
-    a, b, c = vertices[..., faces.long(), :].unbind(-2)
-    normals = torch.cross(b - a, c - a, -1)
-    return unit(_gathered(normals.unsqueeze(-2).expand(*normals.shape[:-1], 3, 3), faces.long(), vertices.shape[-2]))
+    corners = faces.long().T.contiguous()
+    a, b, c = (vertices.index_select(-2, corner) for corner in corners)
+    normals, sums = torch.cross(b - a, c - a, -1), torch.zeros_like(vertices)
+    for corner in corners:
+        sums = sums.index_add(-2, corner, normals)
+    return unit(sums)
 
 
 def vertex_tangents(vertices: Tensor, faces: Tensor, texcoords: Tensor, face_texcoords: Optional[Tensor] = None) -> Tensor:
