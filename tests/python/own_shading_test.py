@@ -76,6 +76,41 @@ class OwnShadingTest(unittest.TestCase):
                 with self.subTest(name):
                     self.check_close(by_contours[name] + inside[name], gradient, 1e-4)
 
+    def test_parts(self):
+        """Colours of faces make the library's images and gradients where each face is a part, of meshes of every kind."""
+        square = np.concatenate([0.9 * SQUARE[:3], SQUARE[:1]])
+        padded = np.stack([FACES, np.concatenate([FACES[:1], -np.ones((3, 3), np.int64)])])
+        apart, turned = np.arange(4)[::-1], TETRAHEDRON * np.float32([1, -1, -1])
+        for name, vertices, faces, parts in (
+                ("shared", turned, FACES, apart), ("shapes", np.stack([turned, 0.8 * turned]), FACES, list(apart)),
+                ("padded", np.stack([turned, square]), padded, np.stack([apart, apart])),
+                ("list", [turned, SQUARE], [FACES, SQUARE_FACES], [apart, np.arange(len(SQUARE_FACES))])):
+            with self.subTest(name):
+                is_list = isinstance(faces, list)
+                colors = [random(len(own), 3, seed=len(own)) for own in faces] if is_list else random(*faces.shape[:-1], 3, seed=4)
+                shown = colors if is_list or faces.ndim == 3 else colors[None]
+                image, pullback = RENDERER.vjp(vertices, faces, self.views, self.intrinsics, face_colors=colors, wrt=["vertices"])
+                samples = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics, parts=parts)
+                ids = samples.face_id.clip(0)
+                values = np.stack([shown[view % len(shown)][own] for view, own in enumerate(ids)])
+                values = np.concatenate([values, np.ones_like(values[..., :1])], -1) * samples.mask[..., None]
+                found, own_pullback = samples.resolve_with_vjp(values)
+                self.check_close(found, image, 1e-5)
+                _, gradient = own_pullback(WEIGHTS)
+                self.assertEqual(sorted(gradient), ["intrinsics", "vertices", "views"])
+                wanted = pullback(WEIGHTS)["vertices"]
+                for ours, theirs in zip(gradient["vertices"] if is_list else [gradient["vertices"]], wanted if is_list else [wanted]):
+                    self.check_close(ours, theirs, 1e-4)
+                without = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics).resolve(values)
+                self.assertGreater(np.abs(without - image).max(), 0.02)
+        ones, none = (RENDERER.rasterize(turned, FACES, self.views, self.intrinsics, parts=parts).resolve(values)
+                      for parts in (np.ones(4, np.int64), None))
+        np.testing.assert_array_equal(ones, none)
+        for given, error, words in (([apart, apart], TypeError, "parts .*got list"), (apart[1:], ValueError, r"parts .*\[3\], expected \[4\]"),
+                                    (np.zeros(4), TypeError, "parts .*indices"), ("wrong", TypeError, "parts .*str")):
+            with self.subTest(words), self.assertRaisesRegex(error, words):
+                RENDERER.rasterize(*self.arguments(), parts=given)
+
     @unittest.skipUnless(torch, "no PyTorch")
     def test_pytorch(self):
         tensors = [torch.from_numpy(array).requires_grad_() for array in (TETRAHEDRON.copy(), self.views, self.intrinsics)]

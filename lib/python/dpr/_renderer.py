@@ -225,32 +225,31 @@ class Renderer:
         return _result(spec, found, warning), pullback
 
     @_arrays.named("dpr.rasterize")
-    def rasterize(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, layers: int = 1,
-                  copy: bool = False, **misspelt: Any) -> Samples:
+    def rasterize(self, vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, parts: Optional[Meshes] = None,
+                  layers: int = 1, copy: bool = False, **misspelt: Any) -> Samples:
         """What the samples of the rigid image show, for shading of the caller's own with noise on the pixel around it.
 
         The arguments are those of a call: one mesh, N shapes, a list of N meshes, or N padded ones, which share launches.
+        parts: [F], or [N, F] of padded meshes, numbers of the parts that faces belong to (materials, charts, np.arange(F)).
+        Shading that jumps has gradients between parts, and at contours, where one surface hides another.
         layers: how many of each sample's surfaces to tell apart, 1 to 256, for shading that sees through them.
 
         Returns Samples: face_id, barycentrics and depth of every sample. interpolate() has the vertices' attributes there;
-        values of any number of channels that are made of them become images by resolve(), which follow the contours: with
-        derivatives by vertices, views and intrinsics, as the library's own images have them. Of the surfaces at a sample
-        the nearest `layers` count, each by Samples.layers: what is blended of them follows also the contours that fewer
-        surfaces hide. Where two cut through one another, their line has no contour, and no gradient. sigma has
-        none either. Raises ValueError (dpr.InvalidArgument) for another preset than "pixel".
+        resolve() makes images of values with any number of channels, with derivatives by vertices, views and intrinsics as
+        the library's own images have them. Of the surfaces at a sample the nearest `layers` count, each by Samples.layers:
+        what is blended of them follows also the contours that fewer surfaces hide. Where two cut through one another, their
+        line has no gradient; nor has sigma. Raises ValueError (dpr.InvalidArgument) for another preset than "pixel".
 
             samples = renderer.rasterize(vertices, faces, views, intrinsics)
             normals = samples.interpolate(vertex_normals)
             image = samples.resolve(my_shader(normals))  # [N, height, width, C]
         """
-        _plan.require_names(misspelt, ("layers", "copy"))
-        samples = _samples.rasterize(*self._plan_samples(vertices, faces, views, intrinsics, layers, copy), copy)
-        if samples._rasterized.warning:
-            _library.warn(samples._rasterized.warning)
-        return samples
+        _plan.require_names(misspelt, ("parts", "layers", "copy"))
+        return _samples.rasterize(*self._plan_samples(vertices, faces, views, intrinsics, layers, copy, parts), copy)
 
-    def _plan_samples(self, vertices, faces, views, intrinsics, layers, copy=False):
-        spec, plan = self._plan(vertices, faces, views, intrinsics, {**_DEFAULTS, "copy": copy}, as_one=True)
+    def _plan_samples(self, vertices, faces, views, intrinsics, layers, copy=False, parts=None):
+        given = {**_DEFAULTS, "face_colors": _samples.colors_of_parts(parts, faces), "copy": copy}
+        spec, plan = self._plan(vertices, faces, views, intrinsics, given, as_one=True)
         return spec._replace(settings=(*spec.settings, _plan.setting("layers", layers))), plan
 
     @_arrays.named("dpr.subdivide")
@@ -354,11 +353,12 @@ def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
 
 
 @_arrays.named("dpr.rasterize")
-def rasterize(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int, layers: int = 1,
-              copy: bool = False, **settings: Setting) -> Samples:
+def rasterize(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
+              parts: Optional[Meshes] = None, layers: int = 1, copy: bool = False, **settings: Setting) -> Samples:
     """Renderer(width, height, **settings).rasterize(): see there."""
-    _plan.require_names(settings, (*_OF_A_RENDERER, "layers", "copy"))
-    return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, layers=layers, copy=copy)
+    _plan.require_names(settings, (*_OF_A_RENDERER, "parts", "layers", "copy"))
+    return Renderer(width, height, **settings).rasterize(vertices, faces, views, intrinsics, parts=parts, layers=layers,
+                                                         copy=copy)
 
 
 def subdivide(vertices: Array, faces: Array, views: Array, intrinsics: Array, *, width: int, height: int,
@@ -392,9 +392,8 @@ _sign(Renderer.rasterize)
 _sign(Renderer.jvp, *_call_keywords)
 _sign(Renderer.vjp, *_call_keywords)
 _all_keywords = {parameter.name: parameter for parameter in (*_setting_keywords, *_call_keywords)}
-_sign(render, *_all_keywords.values())
-_sign(render_with_jvp, *_all_keywords.values())
-_sign(render_with_vjp, *_all_keywords.values())
+for _function in (render, render_with_jvp, render_with_vjp):
+    _sign(_function, *_all_keywords.values())
 _sign(rasterize, *_keywords_of(Renderer.__init__))
 _sign(subdivide, *_keywords_of(Renderer.__init__))
 render.__doc__ += Renderer.__doc__ + "\n    The call:\n\n" + Renderer.__call__.__doc__

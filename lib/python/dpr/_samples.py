@@ -7,7 +7,7 @@ from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
-from . import _arrays, _numpy, _rasterized
+from . import _arrays, _library, _numpy, _rasterized
 from ._rasterized import Rasterized, interpolated
 
 Array = Any
@@ -335,6 +335,28 @@ def _of_name(plan, arrays, name):
     return [array for path, array in zip(plan.paths, arrays) if path[0] == name]
 
 
+def colors_of_parts(parts, faces):
+    """Colours of faces by which the library finds the edges between parts; None without."""
+    if parts is None:
+        return None
+    is_list, faces = isinstance(faces, (list, tuple)), _arrays.from_numbers(faces, True)
+    is_list = is_list and not _arrays.is_array(faces)
+    own = list(parts) if is_list and isinstance(parts, (list, tuple)) else [_arrays.from_numbers(parts, True)]
+    of = list(faces) if is_list else [faces]
+    if len(own) != len(of):
+        _arrays.fail(ValueError, "parts", f"{len(own)} meshes", f"a list of {len(of)}, as faces are")
+    found = []
+    for i, (numbers, mesh) in enumerate(zip(own, of)):
+        name = f"parts[{i}]" if is_list else "parts"
+        numbers = _arrays.converted(name, _arrays.from_numbers(numbers, True), True)
+        mesh = _arrays.converted("faces", _arrays.from_numbers(mesh, True), True)
+        if tuple(numbers.shape) != tuple(mesh.shape[:-1]):
+            _arrays.fail(ValueError, name, list(numbers.shape), list(mesh.shape[:-1]))
+        numbers = np.unique(_arrays.to_numpy(numbers), return_inverse=True)[1].reshape(numbers.shape)
+        found.append(np.repeat(numbers[..., None].astype(np.float32), 3, -1))
+    return found if is_list else found[0]
+
+
 def rasterize(spec, plan, copy):
     """Samples of a call's meshes."""
     leaves, tensors = plan.leaves, None
@@ -348,7 +370,9 @@ def rasterize(spec, plan, copy):
         rasterized, outputs, tensors = _jax.rasterize(spec, leaves)
         read = functools.partial(tuple, outputs)
     else:
-        wanted = [i for i, leaf in enumerate(leaves) if _arrays.type_of(leaf) == "float32"]
+        wanted = [i for i, path in enumerate(plan.paths) if path[0] in ("vertices", "views", "intrinsics")]
         rasterized = Rasterized(spec, [_arrays.to_numpy(leaf) for leaf in leaves], wanted)
         read = functools.lru_cache(None)(lambda: [_arrays.like(plan.given[0], output) for output in rasterized.outputs])
+    if rasterized.warning:
+        _library.warn(rasterized.warning)
     return Samples(rasterized, read, plan, tensors, kind)
