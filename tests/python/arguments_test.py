@@ -85,8 +85,13 @@ class ArgumentsTest(unittest.TestCase):
         for name, value in (("wrap", "clamp"), ("filter", "nearest"), ("colors", random(4, 3))):
             with self.assertRaisesRegex(TypeError, name):
                 dpr.Renderer(SIZE, SIZE, **{name: value})
-        with self.assertRaisesRegex(TypeError, "outputs .* got 'depth', expected a list"):
-            renderer(*MESH, *views, outputs="depth")
+        for outputs in ("depth", None):
+            with self.assertRaisesRegex(TypeError, f"outputs .* got {outputs!r}, expected a list"):
+                renderer(*MESH, *views, outputs=outputs)
+        with self.assertRaisesRegex(TypeError, "wrt .* got 'vertices', expected a list"):
+            renderer.vjp(*MESH, *views, wrt="vertices")
+        with self.assertRaisesRegex(ValueError, r"opacities \(outputs, dpr.render\)"):
+            renderer(*MESH, *views, outputs=["depth"], opacities=np.full(len(MESH[0]), 0.5))
 
     def test_sizes(self):
         for size in (16.0, np.int64(16), np.float32(16), np.array(16)):

@@ -164,8 +164,10 @@ class LossesTest(unittest.TestCase):
         a, b = moved(np.zeros((1500, 3)), 1), moved(np.zeros((1100, 3)), 2)
         squares = ((a[:, None] - b) ** 2).sum(-1)
         self.assertAlmostEqual(float(dpr.chamfer(a, b)), squares.min(1).mean() + squares.min(0).mean(), 6)
-        with self.assertRaisesRegex(ValueError, "others"):
-            dpr.chamfer(a, b[:, :2])
+        self.assertAlmostEqual(float(dpr.chamfer(a.tolist(), b)), float(dpr.chamfer(a, b)), 6)
+        for others, error in ((b[:, :2], ValueError), (b[:0], ValueError), ("b", TypeError)):
+            with self.assertRaisesRegex(error, "others"):
+                dpr.chamfer(a, others)
         if torch:
             points = torch.from_numpy(a[:9]).double().requires_grad_()
             self.assertTrue(torch.autograd.gradcheck(lambda x: dpr.chamfer(x, torch.from_numpy(b[:7]).double()), points))

@@ -171,6 +171,13 @@ class OutputsTest(RenderTest):
         with self.assertRaisesRegex(RuntimeError, "texcoords .* got a mesh that has no texture coordinates"):
             dpr.render(*arguments, width=SIZE, height=SIZE, outputs=["texcoords"])
         vertices = SQUARE.clone().requires_grad_()
+        for faces in (SQUARE_FACES[:0], [SQUARE_FACES[:0]]):  # show nothing, which a step of training should survive
+            of = [vertices] if isinstance(faces, list) else vertices
+            _, outputs = dpr.render(of, faces, views, intrinsics, width=SIZE, height=SIZE, outputs=["depth", "normal"])
+            (gradient,) = torch.autograd.grad(sum(output.sum() for output in outputs.values()), vertices)
+            self.assertEqual(float(gradient.abs().max()), 0)
+        with self.assertRaisesRegex(TypeError, "vertices .*layout torch.sparse_coo"):
+            dpr.render(SQUARE.to_sparse(), SQUARE_FACES, views, intrinsics, width=SIZE, height=SIZE)
         _, outputs = dpr.render(vertices, SQUARE_FACES, views, intrinsics, width=SIZE, height=SIZE, outputs=["depth"])
         (gradient,) = torch.autograd.grad(outputs["depth"].sum(), vertices, create_graph=True)
         with self.assertRaisesRegex(RuntimeError, "no second derivatives"):

@@ -50,6 +50,15 @@ class ReflectionTest(unittest.TestCase):
         below = shading.metallic_roughness(UP, UP, -UP, self.COLOR, 0.5, 0.5)
         self.assertEqual(below.abs().max(), 0)
 
+    def test_unit(self):
+        vectors = torch.tensor([[3.0, 0, 4], [0, 0, 0]], requires_grad=True)
+        units = shading.unit(vectors)
+        torch.testing.assert_close(units, torch.tensor([[0.6, 0, 0.8], [0, 0, 0]]))
+        gradient, = torch.autograd.grad(units[:, 0].sum(), vectors)
+        torch.testing.assert_close(gradient, torch.tensor([[0.128, 0, -0.096], [0, 0, 0]]))
+        with self.assertRaisesRegex(ValueError, "vectors .*ndarray"):
+            shading.unit(vectors.detach().numpy())
+
     def test_light_and_eye_change_places(self):
         a, b = at_angle(20), at_angle(-65)
         there, back = (shading.metallic_roughness(UP, *pair, self.COLOR, 0.3, 0.4) / pair[1][1] for pair in ((a, b), (b, a)))

@@ -129,6 +129,10 @@ class NumpyTest(TangentsTest):
         np.testing.assert_allclose(matrix, jacobian.T @ (rows * jacobian), rtol=1e-4)
         np.testing.assert_allclose(vector, jacobian.T @ (rows[:, 0] * residuals.reshape(-1)), rtol=1e-3)
         np.testing.assert_allclose(dpr.normal_equations(tangents, residuals)[0], jacobian.T @ jacobian, rtol=1e-4)
+        np.testing.assert_allclose(dpr.normal_equations([[1, 2]], [3, 4])[1], [11])
+        for wrong, error in ((residuals[1:], ValueError), (None, TypeError)):
+            with self.assertRaisesRegex(error, "tangents .*expected|residuals .*NoneType"):
+                dpr.normal_equations(tangents, wrong)
 
     def test_gauss_newton_finds_a_shift(self):
         views, intrinsics = cameras(1)

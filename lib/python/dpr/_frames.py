@@ -221,9 +221,9 @@ class Rendered:
 
     def constants(self, wanted):
         """The outputs, as numbers of them, that depend on none of the wanted arrays."""
-        names = {part.name for _, parts in frames_of(self.spec.parts) for part in parts if part.leaf in wanted}
-        return [1 + i for i, name in enumerate(self.spec.outputs)
-                if name in OTHERS or not names & _OF_OUTPUTS]
+        names = {part.leaf: part.name for _, parts in frames_of(self.spec.parts) for part in parts}
+        depend = any(names.get(leaf, "vertices") in _OF_OUTPUTS for leaf in wanted)  # those of no frame are of empty meshes
+        return [1 + i for i, name in enumerate(self.spec.outputs) if name in OTHERS or not depend]
 
     def gradients(self, grads):
         """{index: gradient} of sum <grad, output>, of the outputs whose grad is not None."""

@@ -14,6 +14,11 @@ def _length(vectors):
     return (vectors * vectors).sum(-1).clip(_LEAST) ** 0.5
 
 
+def _mean(values):
+    """Of the last axis; 0 of none. NumPy's quotients of two numbers are not of their type."""
+    return (values / max(values.shape[-1], 1)).sum(-1)
+
+
 def _like(array, values):
     """The same numbers for the array's library."""
     values = np.asarray(values, np.float32)
@@ -60,8 +65,8 @@ class MeshLoss:
     faces  [F, 3], of any triangles: a vertex' ring is every other vertex of its faces, a hinge every two faces that share
            an edge
 
-    The terms take vertices [V, 3] or [N, V, 3] of NumPy, PyTorch or JAX, and return one number, or N. Those of PyTorch and
-    JAX have derivatives. Raises ValueError for other shapes.
+    The terms take vertices [V, 3] or [N, V, 3] of NumPy, PyTorch or JAX, and return one number, or N, of their type. Those of
+    PyTorch and JAX have derivatives. Raises ValueError for other shapes.
     """
 
     def __init__(self, faces: Array):
@@ -93,7 +98,7 @@ class MeshLoss:
         """Mean over edges of (length - target)^2."""
         self._require(vertices)
         a, b = self._edges.T
-        return ((_length(vertices[..., a, :] - vertices[..., b, :]) - target) ** 2).sum(-1) / max(len(self._edges), 1)
+        return _mean((_length(vertices[..., a, :] - vertices[..., b, :]) - target) ** 2)
 
     def normal_consistency(self, vertices: Array) -> Array:
         """Mean over hinges of 1 - cos of the angle between the normals; hinges with a face without area have 0."""
@@ -111,7 +116,7 @@ class MeshLoss:
         b = _cross(vertices[..., self._across[:, 1], :] - start, edge)
         has_area = ((a * a).sum(-1) > _LEAST) & ((b * b).sum(-1) > _LEAST)
         bend = (1 - (a * b).sum(-1) / (_length(a) * _length(b))) * has_area
-        return term(bend).sum(-1) / max(len(self._hinges), 1)
+        return _mean(term(bend))
 
     def _require(self, vertices):
         shape = list(getattr(vertices, "shape", ()))
@@ -158,9 +163,11 @@ def _nearest(lib, points, others):
 def chamfer(points: Array, others: Array) -> Array:
     """Mean squared distance of points [N, 3] to their nearest of the others [M, 3], and the reverse, added up. With PyTorch
     and JAX a function of both. O(N M). Raises ValueError for other shapes."""
+    points, others = _arrays.from_numbers(points), _arrays.from_numbers(others)
     for name, array in (("points", points), ("others", others)):
+        _arrays.require_array(name, array, "dpr.chamfer")
         if len(array.shape) != 2 or array.shape[-1] != 3 or not array.shape[0]:
-            _arrays.fail(ValueError, name, list(array.shape), "[N, 3]", "dpr.chamfer")
+            _arrays.fail(ValueError, name, list(array.shape), "[N, 3], N at least 1", "dpr.chamfer")
     (lib, values), (other_lib, other_values) = _constant(points), _constant(others)
     if lib is not other_lib:
         lib = lib if lib is not np else other_lib

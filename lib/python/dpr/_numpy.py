@@ -84,6 +84,8 @@ def jvp(spec, plan, tangents):
 def vjp(spec, plan, wrt):
     """(outputs, pullback, warning)"""
     leaves, paths = plan.leaves, plan.paths
+    if isinstance(wrt, str):
+        _arrays.fail(TypeError, "wrt", repr(wrt), "a list of names")
     _require_given("wrt", wrt or (), plan)
     wanted = tuple(i for i, (leaf, path) in enumerate(zip(leaves, paths))
                    if _arrays.type_of(leaf) == "float32" and (wrt is None or path[0] in wrt))

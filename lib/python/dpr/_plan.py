@@ -277,7 +277,7 @@ def of_call(renderer, mesh, views, intrinsics, background, lights, smoothing, ou
     """(Spec, Plan) of Renderer.__call__()'s arguments; smoothing: those of sigma, blur, gamma and alpha. as_one: faces
     [N, F, 3] are padded as one frame takes them."""
     known = [*WITH_GRADIENTS, *OTHERS]
-    if isinstance(outputs, str):
+    if not isinstance(outputs, (list, tuple, set, frozenset, dict)):
         fail(TypeError, "outputs", repr(outputs), "a list of names")
     for name in outputs:
         if name not in known:

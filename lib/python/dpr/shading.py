@@ -44,8 +44,11 @@ def _require(name, tensor, last, expected):
 
 
 def unit(vectors: Tensor) -> Tensor:
-    """Vectors [..., 3] of length one; 0 where they have none."""
-    return vectors / vectors.square().sum(-1, keepdim=True).clamp(min=_LEAST**2).sqrt()
+    """Vectors [..., 3] of length one; 0, without a derivative, where they have none."""
+    _require("vectors", vectors, (3,), "[..., 3]")
+    squared = vectors.square().sum(-1, keepdim=True)
+    is_vector = squared > _LEAST**2
+    return torch.where(is_vector, vectors, torch.zeros_like(vectors)) / torch.where(is_vector, squared, torch.ones_like(squared)).sqrt()
 
 
 def _dot(a, b):
@@ -268,6 +271,8 @@ class Environment:
 
     def shade(self, normal: Tensor, to_eye: Tensor, base_color: Tensor, metallic: Number, roughness: Number) -> Tensor:
         """Light [..., 3] that the surface sends to the eye; arguments as metallic_roughness() has them."""
+        for name, tensor in (("normal", normal), ("to_eye", to_eye), ("base_color", base_color)):
+            _require(name, tensor, (3,), "[..., 3]")
         cosine = _dot(normal, to_eye).clamp(0, 1)
         rough = _share(torch.as_tensor(roughness, dtype=normal.dtype)).expand_as(cosine)
         table = _reflected_shares().to(normal.dtype)
