@@ -56,8 +56,8 @@ class Batch {
   void clip_space_rast(NamedArrays arrays, NamedArrays outputs);
   std::size_t covered_count() { return covered().numbers.size(); }
   void interpolate(NamedArrays arrays, const NamedArray& values);
-  void interpolate_backward(NamedArrays arrays, const NamedArray& grad_values, const NamedArray& grad_attributes,
-                            NamedArrays gradients);
+  void interpolate_backward(NamedArrays arrays, const NamedArray& grad_values,
+                            const NamedArray& grad_attributes, NamedArrays gradients);
   void resolve(const NamedArray& values, const NamedArray& images);
   /// values: none for those that resolve() took last.
   void resolve_backward(const NamedArray* values, const NamedArray& grad_images,

@@ -156,7 +156,8 @@ const Batch::Covered& Batch::covered() {
   m.find_samples();
   const MappedRead faces(m.surface_samples->faces);
   const MappedRead places(m.surface_samples->places);
-  const std::size_t count = faces.size() / m.layers, parts = std::max<std::size_t>(count / k_least_of_thread, 1);
+  const std::size_t count = faces.size() / m.layers,
+                    parts = std::max<std::size_t>(count / k_least_of_thread, 1);
   std::vector<Covered> of_parts(parts);
   const auto find_part = [&](std::size_t part) {
     Covered& found = of_parts[part];
@@ -190,14 +191,16 @@ SampleArrays Batch::covered_samples() {
 void Batch::require_covered(const NamedArray& array, std::size_t channels) {
   const std::size_t count = covered_count();
   const std::string expected = "[" + std::to_string(count) + ", " +
-                               (channels == k_any ? "C" : std::to_string(channels)) + "], samples with a face";
+                               (channels == k_any ? "C" : std::to_string(channels)) +
+                               "], samples with a face";
   require_floats(array, {count, channels}, expected);
   if (array.shape[0] != count || array.shape[1] == 0)
     throw InvalidArgument(argument(array), text_of(array.shape), expected);
 }
 
 Attributes Batch::attributes_of(NamedArrays arrays, std::vector<glm::uvec3>& faces) {
-  for (const NamedArray& array : arrays) require_one_of(array, {"attributes", "faces"}, "attributes or faces");
+  for (const NamedArray& array : arrays)
+    require_one_of(array, {"attributes", "faces"}, "attributes or faces");
   const NamedArray& attributes = require(arrays, "attributes");
   require_form(attributes, Element::float32, {{k_any, k_any}, {k_any, k_any, k_any}}, "[V, C] or [N, V, C]");
   const std::size_t views = frame_.renderer().views().size();
@@ -271,8 +274,10 @@ void Batch::resolve_backward(const NamedArray* values, const NamedArray& grad_im
   Renderer& renderer = frame_.renderer();
   start_gradients(gradients);
   const bool is_covered = grad_values.shape.size() == 2;
-  SampleValues given{{}, grad_values.shape.empty() ? 0 : grad_values.shape.back(),
-                     is_covered ? &covered().numbers : nullptr, true};
+  SampleValues given{{},
+                     grad_values.shape.empty() ? 0 : grad_values.shape.back(),
+                     is_covered ? &covered().numbers : nullptr,
+                     true};
   if (values) {
     given = values_of(*values);
   } else if (!impl_of(renderer).holds_resolved()) {

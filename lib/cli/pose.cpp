@@ -376,7 +376,10 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
   command->add_option("--method", options->method, "Method that finds the pose; least_squares by default")
       ->type_name("least_squares|descent");
   command->add_option("-o,--output", options->output, "Pose to write")->required()->type_name("P.json");
-  command->add_option("--report", options->report, "Folder for pictures, plots and a page that shows them")
+  command
+      ->add_option("--report", options->report,
+                   "Folder for pictures, plots and a page that shows them beside --target; of --views one "
+                   "for each picture")
       ->type_name("DIR");
   add_bop_options(*command, options->bop);
   add_least_squares_options(*command, *options);

@@ -89,8 +89,9 @@ class PixelNoise {
   /// Number of the samples that smooth() and blend() took last: others have another. Never 0 after them.
   std::uint64_t smoothed() const { return smoothed_; }
   /// From the gradient of what smooth() made of the last samples to theirs, and to the contours' ends.
-  void smooth_backward(const ContourInputs& in, const Blur::Size& size, const BufferRef<cl_float4>& grad_image,
-                       Buffer<cl_float4>& grad_samples, Buffer<float>& scratch);
+  void smooth_backward(const ContourInputs& in, const Blur::Size& size,
+                       const BufferRef<cl_float4>& grad_image, Buffer<cl_float4>& grad_samples,
+                       Buffer<float>& scratch);
 
   /// From the tangents of the samples that smooth() took last, which are blended in place, to those of its pixels,
   /// along a group's directions.

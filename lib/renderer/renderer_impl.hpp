@@ -76,7 +76,7 @@ struct SampleValues {
   std::span<const float> values;
   std::size_t channels;
   const std::vector<cl_uint>* numbers = nullptr;  // none: all
-  bool are_kept = false;                          // values are left out: they are those that resolve() took last
+  bool are_kept = false;  // values are left out: they are those that resolve() took last
 };
 
 /// Elements of a buffer.
@@ -346,7 +346,7 @@ struct Renderer::Impl : OnDevice, ViewSet {
   cl_uint seen_layers_ = 1;         // through which the last frame's contours are seen: see find_front()
   Buffer<float> own_samples_, own_pixels_, own_tangents_;  // of the caller's shading, packed
   Buffer<cl_float4> own_group_, own_image_, grad_group_;   // four of their channels
-  std::uint64_t resolved_ = 0;  // PixelNoise::smoothed() of the last resolve() of at most so many
+  std::uint64_t resolved_ = 0;     // PixelNoise::smoothed() of the last resolve() of at most so many
   Buffer<cl_float4> grad_images_;  // of the triangles' noise: see room_for_grad_images()
   Buffer<float> hidden_;           // [view][mesh] BackFaces::hidden()
   std::vector<float> uploaded_hidden_;

@@ -125,11 +125,11 @@ double least_loss(const std::vector<Candidate>& candidates) {
   return std::ranges::min(candidates, {}, loss).equations.loss;
 }
 
-/// True if the best candidate still descends. `losses` are those of all iterations so far.
-bool still_falls(const std::vector<double>& losses) {
+/// True if the best candidate still descends, after half of the turns steeply. `losses` are those of all iterations so far.
+bool still_falls(const std::vector<double>& losses, unsigned most) {
   constexpr std::size_t k_last = 3;
-  constexpr double k_least_fall = 0.03;  // over the last iterations
-  return losses.size() > k_last && losses.back() < (1 - k_least_fall) * losses[losses.size() - 1 - k_last];
+  const double least_fall = losses.size() > most / 2 ? 0.1 : 0.03;  // over the last iterations
+  return losses.size() > k_last && losses.back() < (1 - least_fall) * losses[losses.size() - 1 - k_last];
 }
 
 }  // namespace
@@ -174,7 +174,7 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
     losses.push_back(least_loss(candidates));
     const bool is_enough = iteration >= turns.enough;
-    if (is_enough && !turns.longer_pixels && !still_falls(losses)) break;
+    if (is_enough && !turns.longer_pixels && !still_falls(losses, turns.most)) break;
     const double still_pixels = is_enough ? turns.longer_pixels.value_or(k_still_pixels) : k_still_pixels;
     if (!report()) return false;
     std::vector<Candidate*> moving;

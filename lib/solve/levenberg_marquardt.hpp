@@ -30,7 +30,7 @@ struct Candidate {
 };
 
 /// Factor on the number of steps while the best candidate still falls.
-inline constexpr unsigned k_patience = 4;
+inline constexpr unsigned k_patience = 8;
 
 /// The step -(H + damping diag(H))^-1 g; false where H is not positive definite even so.
 bool damped_step(const NormalEquations& equations, std::size_t parameters, double damping,

@@ -870,10 +870,12 @@ static void check_covered(dpr_frame* frame, const dpr_array* samples, size_t see
   float table[12], grad_table[12], of_all_table[12], by_table[9], of_all[9], by_contours[9], again[9];
   float *const rows = calloc(4 * seen, sizeof(float)), *const grad_rows = malloc(4 * seen * sizeof(float));
   float *const kept_rows = malloc(4 * seen * sizeof(float)), *const whole = malloc(4 * all * sizeof(float));
-  float *const grad_whole = malloc(4 * all * sizeof(float)), *const grad_places = malloc(3 * all * sizeof(float));
+  float *const grad_whole = malloc(4 * all * sizeof(float)), *const grad_places =
+                                                                 malloc(3 * all * sizeof(float));
   int32_t of_faces[] = {0, 1, 2};
   const dpr_array attributes = {"attributes", table, DPR_FLOAT32, 2, {3, 4}};
-  const dpr_array at_samples[] = {samples[0], samples[1], attributes, {"faces", of_faces, DPR_INT32, 2, {1, 3}}};
+  const dpr_array at_samples[] = {
+      samples[0], samples[1], attributes, {"faces", of_faces, DPR_INT32, 2, {1, 3}}};
   const dpr_array values = {"values", rows, DPR_FLOAT32, 2, {seen, 4}};
   const dpr_array grad_values = {"values", grad_rows, DPR_FLOAT32, 2, {seen, 4}};
   const dpr_array kept_values = {"values", kept_rows, DPR_FLOAT32, 2, {seen, 4}};
@@ -928,14 +930,16 @@ static void check_covered(dpr_frame* frame, const dpr_array* samples, size_t see
   gradient.data = of_all;
   OK(dpr_frame_samples_backward(frame, grads + 1, 1, &gradient, 1));
   for (i = 0; i < 9; ++i) EXPECT(by_table[i] != 0 && by_table[i] == of_all[i]);
-  for (i = 0; i < 12; ++i) EXPECT(fabsf(grad_table[i] - of_all_table[i]) < 1e-5f * (1 + fabsf(grad_table[i])));
+  for (i = 0; i < 12; ++i)
+    EXPECT(fabsf(grad_table[i] - of_all_table[i]) < 1e-5f * (1 + fabsf(grad_table[i])));
 
   wrong.shape[0] = seen + 1;
   REFUSED(dpr_frame_resolve(frame, &wrong, &image), "samples with a face");
   REFUSED(dpr_frame_interpolate(frame, &attributes, 1, &wrong), "samples with a face");
   REFUSED(dpr_frame_interpolate(frame, samples, 1, &values), "attributes");
   wrong = by_values, wrong.shape[0] = 2;
-  REFUSED(dpr_frame_interpolate_backward(frame, &attributes, 1, &grad_values, &wrong, &gradient, 1), "attributes");
+  REFUSED(dpr_frame_interpolate_backward(frame, &attributes, 1, &grad_values, &wrong, &gradient, 1),
+          "attributes");
   rows[0] = NAN;
   REFUSED(dpr_frame_resolve(frame, &values, &image), "finite");
   REFUSED(dpr_frame_covered(frame, NULL), "count");

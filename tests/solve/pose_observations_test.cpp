@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "dpr/aov.hpp"
 #include "dpr/error.hpp"
+#include "dpr/mesh.hpp"
 #include "dpr/pose.hpp"
 #include "dpr/renderer.hpp"
 #include "support/messages.hpp"
@@ -125,6 +127,28 @@ TEST_SUITE("pipeline") {
     method.depth.image = seen.depth;
     method.silhouette.image = seen.silhouette;
     check_near(find(device, body_scene(), {}, method, moved(12, {0.05, 0.05, 0.1})), 1, 0.03);
+  }
+
+  TEST_CASE("depths alone explain an object in pictures of any size, and no other") {
+    const Device device = open_device();
+    for (const int size : {64, 96, 128, 192}) {
+      CAPTURE(size);
+      Scene scene = body_scene();
+      scene.width = scene.height = test::reduced(size, 8);
+      LeastSquares method = near_start();
+      method.depth.image = Seen(device, scene).depth;
+      check_found(find(device, scene, {}, method, moved(6, {0.05, 0, 0.1})), 48.0 / size, 1.0 / size);
+      Scene other = scene;
+      other.meshes[0].mesh = make_icosphere(2);
+      const PoseResult wrong = find(device, other, {}, method, k_truth);
+      Scene turned = scene;  // its mirror image
+      for (glm::vec3& p : turned.meshes[0].mesh.positions) p.x = -p.x;
+      for (glm::uvec3& face : turned.meshes[0].mesh.faces) std::swap(face.x, face.y);
+      const PoseResult mirrored = find(device, turned, {}, method, k_truth);
+      if (test::is_reduced()) return;
+      CHECK_FALSE(wrong.explained);
+      CHECK_FALSE(mirrored.explained);
+    }
   }
 
   TEST_CASE("silhouette and depths rescue a pose from a picture in a light that is wrong") {
