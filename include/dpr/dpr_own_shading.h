@@ -12,10 +12,11 @@ extern "C" {
 #endif
 
 /* Of frames with the preset "pixel" and without lights: what the samples of the rigid image show, and images of the
- * values that the caller finds for them; colours and textures have no part in it. The samples of a view are a raster
- * from the top left, `supersampling` a pixel and axis, with a margin around the image. They show the nearest surface
- * alone, or by the setting "layers=L" the nearest L, for values that blend these as see-through: contours count then
- * unless L surfaces hide them. */
+ * values that the caller finds for them; colours have no part in it, but that values may jump between faces whose
+ * face_colors differ, as at contours: elsewhere within a surface such a jump has no gradient. The samples of a view are
+ * a raster from the top left, `supersampling` a pixel and axis, with a margin around the image. They show the nearest
+ * surface alone, or by the setting "layers=L" the nearest L, for values that blend these as see-through: contours count
+ * then unless L surfaces hide them. */
 typedef struct dpr_raster {
   int width, height, supersampling, margin; /* samples */
   int layers;

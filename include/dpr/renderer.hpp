@@ -277,8 +277,9 @@ class DPR_API Renderer : public ArraySetters<Renderer> {
   /// hide. The library's own images take longer then, and differ by the far sides, as set_shapes() says. Throws
   /// InvalidArgument.
   void set_layers(int count);
-  /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights, colours or
-  /// textures, which have no part in it. The nearest surfaces alone count, whatever gamma is. Blocks. Throws as image()
+  /// What the samples of the last forward() show, with noise on the pixel: of a scene without lights. Its colours have
+  /// no part in it, but that resolve() follows edges where they jump, such as those of faces: others' shading may jump
+  /// there. The nearest surfaces alone count, whatever gamma is. Blocks. Throws as image()
   /// does, and InvalidArgument without noise on the pixel, and with opacities below 1. dpr/interpolate.hpp and
   /// dpr/texture_map.hpp make colours of them.
   Samples samples(bool with_steps = false);

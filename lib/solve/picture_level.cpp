@@ -21,7 +21,6 @@ constexpr std::size_t k_most_faces = std::size_t{1} << 20;
 constexpr double k_color_channels = 3;
 constexpr const char* k_level = "PictureLevel";     // in errors
 constexpr std::size_t k_coverage = 0, k_depth = 1;  // kinds of MeasuredWeights
-constexpr float k_depth_scale = 4;                  // deviations, of robust losses
 
 /// Positions and faces alone, black.
 Mesh shape_of(const Mesh& mesh) {
@@ -171,11 +170,6 @@ std::vector<cl_float4> PictureLevel::measured(const PictureImages& images) const
   return result;
 }
 
-/// The side of a pixel, at the object's distance.
-float PictureLevel::pixel_depth() const {
-  return static_cast<float>(space_.radius() / space_.radius_ndc() * pixel_ndc());
-}
-
 double PictureLevel::pixel_ndc() const { return 2.0 / std::min(width(), height()); }
 
 template <typename Visitor>
@@ -263,11 +257,14 @@ void PictureLevel::set_color_scale(float scale) {
 }
 
 void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
+  constexpr float k_scale = 4;  // deviations, of robust losses
   constexpr float k_coverage_scale = 0.5F;
   // What pixels leave of coverage anywhere; and in parts of a pixel's side, of depth.
   constexpr float k_least_coverage = 0.05F, k_least_of_pixel = 0.25F;
   // What residuals say beyond this, before the finest level, is how wrong the poses are.
   constexpr float k_most_coverage = 0.25F, k_most_of_pixel = 1;
+  // Without colours a quite other depth, k_scale deviations, counts no more than a pixel that is missing.
+  constexpr float k_most_beside_depths = 0.1F;
   if (!weighs_observations_) return;
   std::array<std::vector<float>, std::tuple_size_v<Deviations>> found;
   in_batches(hypotheses, 1, [&](std::span<const Hypothesis> batch) {
@@ -276,11 +273,12 @@ void PictureLevel::weigh_observations(std::span<const Hypothesis> hypotheses) {
         if (deviations[kind]) found[kind].push_back(*deviations[kind]);
     }
   });
-  const float pixel = pixel_depth();
+  const auto pixel = static_cast<float>(space_.radius() / space_.radius_ndc() * pixel_ndc());
   const float of_colors = best_of(found[0]);
   float of_coverage = std::max(best_of(found[1]), k_least_coverage);
   float of_depth = std::max(best_of(found[2]), k_least_of_pixel * pixel);
-  scales_.measured[k_depth].scale = k_depth_scale * of_depth;
+  scales_.measured[k_depth].scale = k_scale * of_depth;
+  if (depths_ && !counts_colors_) of_coverage = std::min(of_coverage, k_most_beside_depths);
   if (!is_finest_) {
     of_coverage = std::min(of_coverage, k_most_coverage);
     of_depth = std::min(of_depth, k_most_of_pixel * pixel);
@@ -348,8 +346,9 @@ double PictureLevel::blank_loss() {
 }
 
 LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
+  const bool counts_depths = counts_colors_ && depths_;
   LossParts parts;
-  if (!has_unknown_background_ && !depths_) return parts;
+  if (!has_unknown_background_ && !counts_depths) return parts;
   const HypothesisImages images = render({&hypothesis, 1});
   const double loss = sums_->measured_loss(images, scales_.measured);
   const auto without = [&](std::size_t kind) {
@@ -358,19 +357,15 @@ LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
     return sums_->measured_loss(images, weights);
   };
   if (has_unknown_background_) parts.uncovered = loss - without(k_coverage);
-  if (depths_) {
-    // Of what quite other depths leave: others may lie before some of the object. Without colours that is no excuse, but
-    // the usual differences are.
-    constexpr double k_matched = 0.5, k_usual = 0.86 / (k_depth_scale * k_depth_scale);
+  if (counts_depths) {
+    // Of what quite other depths leave: others may lie before some of the object.
+    constexpr double k_matched = 0.5;
     constexpr float k_sharper = 1e4F;
-    const double usual_of_pixel =
-        std::min(1.0, std::pow(k_depth_scale * pixel_depth() / scales_.measured[k_depth].scale, 2));
     const double others = without(k_depth);
     MeasuredWeights most = scales_.measured;
     most[k_depth].scale /= k_sharper;
     most[k_depth].weight *= k_sharper * k_sharper;
-    parts.matched = std::min(loss - others, (counts_colors_ ? k_matched : k_usual * usual_of_pixel) *
-                                                (sums_->measured_loss(images, most) - others));
+    parts.matched = std::min(loss - others, k_matched * (sums_->measured_loss(images, most) - others));
   }
   return parts;
 }

@@ -26,7 +26,7 @@ struct PictureImages {
 /// Parts of a hypothesis' loss that say nothing against it.
 struct LossParts {
   double uncovered = 0;  ///< of pixels that it does not cover; 0 where the background is known
-  double matched = 0;    ///< of depths that match as well as may be
+  double matched = 0;    ///< of depths that match, beside colours
 
   double sum() const { return uncovered + matched; }
 };
@@ -76,7 +76,6 @@ class PictureLevel {
   double pixel_ndc() const;
 
  private:
-  float pixel_depth() const;
   /// Means over the samples of pixels, and of their tangents; empty where pixels are samples.
   struct Means {
     Buffer<cl_float4> images, tangents;

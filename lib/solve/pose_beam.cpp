@@ -85,6 +85,60 @@ void add_half_turns(std::vector<Candidate>& candidates, std::span<const glm::dma
   }
 }
 
+namespace {
+
+/// Poses to which the motions between the first of `equals` and the others lead from `candidates`, but for those nearer
+/// than `apart` to one of `known`, which they join.
+std::vector<Candidate> moved_alike(std::span<const Candidate> equals, std::span<const Candidate> candidates,
+                                   const PoseSpace& space, double apart, std::vector<Hypothesis>& known) {
+  std::vector<Candidate> found;
+  const Pose& first = equals.front().hypothesis.pose;
+  const glm::dmat3 back = glm::transpose(first.rotation);
+  for (const Candidate& candidate : candidates) {
+    for (const Candidate& other : equals.subspan(1)) {
+      Hypothesis moved = candidate.hypothesis;
+      const glm::dmat3 turn = moved.pose.rotation * back;
+      moved.pose.translation += turn * (other.hypothesis.pose.translation - first.translation);
+      moved.pose.rotation = turn * other.hypothesis.pose.rotation;
+      const auto is_near = [&](const Hypothesis& h) { return space.distance(h, moved) < apart; };
+      if (std::ranges::any_of(known, is_near)) continue;
+      known.push_back(moved);
+      found.push_back({moved});
+    }
+  }
+  return found;
+}
+
+}  // namespace
+
+void add_equals(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& equals,
+                std::vector<Candidate> spare, const EqualsWork& work) {
+  constexpr std::size_t k_most =
+      64;                          // a solid's own turns are at most 60, those of a round body without number
+  constexpr double k_apart = 0.1;  // of the object's radius: closer ones are one
+  const double apart = k_apart * space.radius_ndc();
+  std::vector<Hypothesis> known = hypotheses_of(equals);
+  const auto add = [&](std::vector<Candidate> others) {
+    for (Candidate& candidate : others) candidate.restart();
+    if (others.empty()) return;
+    refine(level, space, others, {work.iterations, work.iterations}, [] { return true; });
+    for (const Candidate& c : others) {
+      const auto is_near = [&](const Candidate& other) {
+        return space.distance(c.hypothesis, other.hypothesis) < apart;
+      };
+      if (c.equations.loss <= work.most_loss && std::ranges::none_of(equals, is_near)) equals.push_back(c);
+    }
+  };
+  add(std::move(spare));
+  const std::vector<Candidate> first = equals;
+  for (std::size_t from = 0; from < equals.size() && equals.size() < k_most;) {
+    const std::vector<Candidate> last(equals.begin() + static_cast<std::ptrdiff_t>(from), equals.end());
+    from = equals.size();
+    add(moved_alike(first, last, space, apart, known));
+  }
+  equals.resize(std::min(equals.size(), k_most));
+}
+
 double enough_to_equal(double best, double wrong) {
   return best + k_equal_losses * std::max(wrong - best, 0.0);
 }

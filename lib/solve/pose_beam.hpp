@@ -63,6 +63,16 @@ void drop_hopeless_at(PoseLevel& level, std::vector<Candidate>& candidates, std:
 void add_half_turns(std::vector<Candidate>& candidates, std::span<const glm::dmat3> half_turns,
                     std::size_t count);
 
+struct EqualsWork {
+  unsigned iterations;
+  double most_loss;  ///< of an equal of the best
+};
+
+/// To poses that explain the target, the best first, adds those of `spare` that do, and what the motions between all of
+/// them lead to: these may be the object's own. Up to 64.
+void add_equals(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& equals,
+                std::vector<Candidate> spare, const EqualsWork& work);
+
 /// The largest loss that tells a pose from the best no more.
 double enough_to_equal(double best, double wrong);
 

@@ -93,7 +93,8 @@ class Fit {
   CornerNormals normals_ = CornerNormals::parted;
   bool goes_on_ = true;
   std::vector<Candidate> candidates_;
-  double wrong_ = 0;  // loss of a pose that explains nothing
+  std::vector<Candidate> spare_;  // equals of the best that a level had no room for
+  double wrong_ = 0;              // loss of a pose that explains nothing
   PoseResult result_;
 };
 
@@ -279,9 +280,18 @@ void Fit::start(PoseLevel& level) {
 
 void Fit::work(PoseLevel& level, std::size_t keep) {
   const unsigned iterations = goes_on_ ? method_.iterations : 0;  // stopped: only judged at this level
-  goes_on_ = refine_distinct(level, space_, candidates_, {iterations, keep, wrong_},
+  goes_on_ = refine_distinct(level, space_, candidates_, {iterations, candidates_.size(), wrong_},
                              [&] { return report(level); }) &&
              goes_on_;
+  std::vector<Candidate> kept;
+  for (const Candidate& c : candidates_) {
+    if (kept.size() < keep || c.is_initial) {
+      kept.push_back(c);
+    } else if (c.equations.loss <= enough()) {
+      spare_.push_back(c);
+    }
+  }
+  candidates_ = std::move(kept);
 }
 
 bool Fit::report(const PoseLevel& level) {
@@ -294,6 +304,16 @@ bool Fit::report(const PoseLevel& level) {
 }
 
 void Fit::finish(PoseLevel& level) {
+  const auto others = std::ranges::stable_partition(
+      candidates_, [most = enough()](const Candidate& c) { return c.equations.loss <= most; });
+  spare_.insert(spare_.end(), others.begin(), others.end());
+  candidates_.erase(others.begin(), others.end());
+  // By depths and silhouettes a body's own turns differ more than is enough: steps end somewhat earlier here or there.
+  const double uneven = has_colors_ ? 1 : 20, best = candidates_.front().equations.loss;
+  if (method_.rotations > 0 && goes_on_) {
+    add_equals(level, space_, candidates_, std::move(spare_),
+               {method_.iterations, best + uneven * (enough() - best)});
+  }
   choose_equals();
   static_cast<PoseHypothesis&>(result_) = result_.equals.front();
   result_.covariance = pose_covariance(level, space_, candidates_.front().hypothesis);
@@ -302,8 +322,6 @@ void Fit::finish(PoseLevel& level) {
 
 /// The poses that explain the target as well as the best, the one to return first.
 void Fit::choose_equals() {
-  const double most = enough();
-  std::erase_if(candidates_, [&](const Candidate& c) { return c.equations.loss > most; });
   if (!anywhere_) {
     const Hypothesis first{initial_.front()};
     std::ranges::stable_sort(candidates_, {},

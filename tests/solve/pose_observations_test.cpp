@@ -151,6 +151,26 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("depths of a cube are explained by each of its 24 poses") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    Scene scene = body_scene();
+    scene.meshes[0].mesh = make_cube();
+    LeastSquares method;
+    method.depth.image = Seen(device, scene).depth;
+    const PoseResult result = find(device, scene, {}, method, moved(10, {0.05, 0, 0.1}));
+    CHECK(result.explained);
+    CHECK(result.equals.size() == 24);
+    CHECK(angle_degrees(result.pose.rotation, k_truth.rotation) < 1);
+    for (const PoseHypothesis& equal : result.equals) {
+      const glm::dmat3 turn = glm::transpose(result.pose.rotation) * equal.pose.rotation;
+      for (int axis = 0; axis < 3; ++axis) {  // onto another, to within two degrees
+        const glm::dvec3 turned = glm::abs(turn[axis]);
+        CHECK(std::max({turned.x, turned.y, turned.z}) > std::cos(glm::radians(2.0)));
+      }
+    }
+  }
+
   TEST_CASE("silhouette and depths rescue a pose from a picture in a light that is wrong") {
     const Device device = open_device();
     const Seen seen(device);
