@@ -274,24 +274,17 @@ void Batch::resolve_backward(const NamedArray* values, const NamedArray& grad_im
   Renderer& renderer = frame_.renderer();
   start_gradients(gradients);
   const bool is_covered = grad_values.shape.size() == 2;
-  SampleValues given{{},
-                     grad_values.shape.empty() ? 0 : grad_values.shape.back(),
-                     is_covered ? &covered().numbers : nullptr,
-                     true};
+  is_covered ? require_covered(grad_values, k_any) : require_values(grad_values, true, nullptr);
+  require_values(grad_images, false, &grad_values);
   if (values) {
-    given = values_of(*values);
+    require_like(grad_values, *values);
   } else if (!impl_of(renderer).holds_resolved()) {
     throw InvalidArgument("values (batch)", "NULL",
                           "values, unless dpr_frame_resolve() took them last, of at most 4 channels");
   }
-  if (values) {
-    require_like(grad_values, *values);
-  } else if (is_covered) {
-    require_covered(grad_values, k_any);
-  } else {
-    require_values(grad_values, true, nullptr);
-  }
-  require_values(grad_images, false, &grad_values);
+  const SampleValues given =
+      values ? values_of(*values)
+             : SampleValues{{}, grad_values.shape.back(), is_covered ? &covered().numbers : nullptr, true};
   if (find(gradients, "sigma"))
     throw InvalidArgument("sigma (batch)", "its gradient",
                           "that of vertices, views or intrinsics, with own shading");

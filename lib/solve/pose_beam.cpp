@@ -87,6 +87,9 @@ void add_half_turns(std::vector<Candidate>& candidates, std::span<const glm::dma
 
 namespace {
 
+constexpr std::size_t k_most_equals =
+    64;  // a solid's own turns are at most 60, those of a round body without number
+
 /// Poses to which the motions between the first of `equals` and the others lead from `candidates`, but for those nearer
 /// than `apart` to one of `known`, which they join.
 std::vector<Candidate> moved_alike(std::span<const Candidate> equals, std::span<const Candidate> candidates,
@@ -101,7 +104,7 @@ std::vector<Candidate> moved_alike(std::span<const Candidate> equals, std::span<
       moved.pose.translation += turn * (other.hypothesis.pose.translation - first.translation);
       moved.pose.rotation = turn * other.hypothesis.pose.rotation;
       const auto is_near = [&](const Hypothesis& h) { return space.distance(h, moved) < apart; };
-      if (std::ranges::any_of(known, is_near)) continue;
+      if (known.size() >= k_most_equals || std::ranges::any_of(known, is_near)) continue;
       known.push_back(moved);
       found.push_back({moved});
     }
@@ -113,11 +116,9 @@ std::vector<Candidate> moved_alike(std::span<const Candidate> equals, std::span<
 
 void add_equals(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& equals,
                 std::vector<Candidate> spare, const EqualsWork& work) {
-  constexpr std::size_t k_most =
-      64;                          // a solid's own turns are at most 60, those of a round body without number
-  constexpr double k_apart = 0.1;  // of the object's radius: closer ones are one
+  constexpr std::size_t k_most_spare = 16;  // which is enough to find a body's turns by
+  constexpr double k_apart = 0.1;           // of the object's radius: closer ones are one
   const double apart = k_apart * space.radius_ndc();
-  std::vector<Hypothesis> known = hypotheses_of(equals);
   const auto add = [&](std::vector<Candidate> others) {
     for (Candidate& candidate : others) candidate.restart();
     if (others.empty()) return;
@@ -129,14 +130,14 @@ void add_equals(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>
       if (c.equations.loss <= work.most_loss && std::ranges::none_of(equals, is_near)) equals.push_back(c);
     }
   };
-  add(std::move(spare));
+  add(distinct(std::move(spare), space, apart, k_most_spare));
   const std::vector<Candidate> first = equals;
-  for (std::size_t from = 0; from < equals.size() && equals.size() < k_most;) {
+  std::vector<Hypothesis> known = hypotheses_of(equals);
+  for (std::size_t from = 0; from < equals.size();) {
     const std::vector<Candidate> last(equals.begin() + static_cast<std::ptrdiff_t>(from), equals.end());
     from = equals.size();
     add(moved_alike(first, last, space, apart, known));
   }
-  equals.resize(std::min(equals.size(), k_most));
 }
 
 double enough_to_equal(double best, double wrong) {

@@ -103,6 +103,16 @@ class OwnShadingTest(unittest.TestCase):
                     self.check_close(ours, theirs, 1e-4)
                 without = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics).resolve(values)
                 self.assertGreater(np.abs(without - image).max(), 0.02)
+        if torch:  # a body that turns, by the library's own image and by tensors
+            colors, gradients = torch.from_numpy(random(4, 3, seed=4)), []
+            for is_own in (False, True):
+                vertices = torch.from_numpy(turned.copy()).requires_grad_()
+                given = vertices, torch.from_numpy(FACES), self.views, self.intrinsics
+                samples = RENDERER.rasterize(*given, parts=torch.arange(4)) if is_own else None
+                image = samples.resolve(colors[samples.face_id.clamp(min=0)] * samples.mask[..., None]) if is_own else \
+                    RENDERER(*given, face_colors=colors)[..., :3]
+                gradients.append(torch.autograd.grad((image * torch.from_numpy(WEIGHTS[..., :3].copy())).sum(), vertices)[0])
+            self.check_close(*gradients, 1e-4)
         ones, none = (RENDERER.rasterize(turned, FACES, self.views, self.intrinsics, parts=parts).resolve(values)
                       for parts in (np.ones(4, np.int64), None))
         np.testing.assert_array_equal(ones, none)

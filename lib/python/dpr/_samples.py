@@ -251,9 +251,7 @@ class Samples:
     def _for_frame(self, values):
         """Values of all samples, 0 where nothing is, of those of the samples with a face; the library takes the nearest
         layer's as they are."""
-        if values.ndim == 2 and not self._is_of_jax and self._layer == 0 or values.ndim not in (2, 4):
-            return values
-        if values.ndim == 4:
+        if values.ndim != 2 or not self._is_of_jax and self._layer == 0:
             return values
         if len(values) != len(self._covered) or values.shape[-1] == 0:
             _arrays.fail(ValueError, "values", list(values.shape), _rasterized.shapes_of_values(self._size, len(self._covered)),
