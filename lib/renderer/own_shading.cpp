@@ -118,7 +118,9 @@ SceneGradient Renderer::Impl::samples_backward(const WritePlaces& write) {
   return finish_geometric_gradient();
 }
 
-bool Renderer::Impl::holds_resolved() const { return pixel_noise && resolved_ == pixel_noise->smoothed(); }
+bool Renderer::Impl::holds_resolved() const {
+  return pixel_noise && resolved_ != 0 && resolved_ == pixel_noise->smoothed();
+}
 
 /// Four of the caller's channels at the samples, from `first` on, of values that are packed in `own_samples_`, or the
 /// caller's.

@@ -901,6 +901,8 @@ static void check_covered(dpr_frame* frame, const dpr_array* samples, size_t see
     for (i = 0; i < 4; ++i) EXPECT(rows[4 * row + (size_t)i] == whole[4 * k + (size_t)i]);
     ++row;
   }
+  gradient.data = by_contours; /* there are no values yet */
+  REFUSED(dpr_frame_resolve_backward(frame, NULL, &grad, &kept_values, &gradient, 1), "values");
   OK(dpr_frame_resolve(frame, &of_samples, &whole_image));
   OK(dpr_frame_resolve(frame, &values, &image));
   for (i = 0; i < FLOATS; ++i) EXPECT(images[i] == of_all_images[i]);

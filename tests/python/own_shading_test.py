@@ -334,6 +334,10 @@ class OwnShadingTest(unittest.TestCase):
                     (found, scene), (grad_values, by_name) = pullback(weights), of_all(weights)
                     np.testing.assert_array_equal(found, grad_values[samples.mask])
                     np.testing.assert_array_equal(scene["views"], by_name["views"])
+                    samples.resolve_with_vjp(values)[1](weights)  # of values that the frame keeps
+                    _, again = samples.resolve_with_vjp(rows)
+                    samples.jvp({"vertices": [mesh[None] for mesh in vertices] if isinstance(vertices, list) else vertices[None]})
+                    np.testing.assert_array_equal(again(weights)[0], found)
                     moved = random(2, *rows.shape, seed=6)
                     spread = np.zeros((2, *values.shape), np.float32)
                     spread[:, samples.mask] = moved

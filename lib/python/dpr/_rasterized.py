@@ -140,7 +140,7 @@ class Rasterized:
         count = len(next(iter(given.values())))
         found = [np.empty((count, *shape), np.float32) for shape in self._output_shapes[1:]]
         rows = [(name, array.reshape(-1, *array.shape[3:])) for name, array in zip(_NAMES[1:], found)]
-        moving = self._moving(count, given)
+        moving, self._resolved = self._moving(count, given), None  # the frame may be rendered again
         _library.call("dpr_frame_samples_tangent", self._frame.handle, count, *_frames.c_arrays(moving),
                       *_frames.c_arrays(rows))
         return found
