@@ -83,7 +83,7 @@ class Batch {
   SampleArrays covered_samples();
   /// Throws InvalidArgument unless an array is floats [M, channels] of the samples that show a face.
   void require_covered(const NamedArray& array, std::size_t channels);
-  /// Of all samples, or of those with a face, by the array's dimensions.
+  /// The values of all samples, or of those with a face, by the dimensions.
   SampleValues values_of(const NamedArray& array);
   /// Throws InvalidArgument for another shape than the output's, whose pixels have so many channels; 0: a
   /// number.

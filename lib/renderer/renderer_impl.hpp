@@ -71,7 +71,7 @@ enum class FrameSizes { read, kept };
 
 class RowReads;
 
-/// What the caller has shaded: packed values of all samples, or of those with these numbers, where the others are 0.
+/// Values that the caller has shaded, packed: of all samples, or of those with these numbers, where the others are 0.
 struct SampleValues {
   std::span<const float> values;
   std::size_t channels;
