@@ -93,7 +93,7 @@ def require_array(name, array, where="dpr.render", expected="a tensor or an arra
 def converted(name, array, is_indices=False, where="dpr.render"):
     """The array as float32, or as int32 or int64. Fails for no array and for another kind of numbers."""
     require_array(name, array, where)
-    if module_of(array) == "torch" and str(array.layout) != "torch.strided":
+    if module_of(array) == "torch" and array.layout is not sys.modules["torch"].strided:
         fail(TypeError, name, f"a tensor with layout {array.layout}", "one with torch.strided", where)
     kind = type_of(array)
     if kind != "float32" and isinstance(array, np.ndarray):

@@ -337,10 +337,9 @@ def colors_of_parts(parts, faces):
     """Colours of faces by which the library finds the edges between parts; None without."""
     if parts is None:
         return None
-    is_list, faces = isinstance(faces, (list, tuple)), _arrays.from_numbers(faces, True)
-    is_list = is_list and not _arrays.is_array(faces)
-    own = list(parts) if is_list and isinstance(parts, (list, tuple)) else [_arrays.from_numbers(parts, True)]
-    of = list(faces) if is_list else [faces]
+    faces = _arrays.from_numbers(faces, True)
+    is_list = isinstance(faces, (list, tuple))
+    own, of = (parts if isinstance(parts, (list, tuple)) else [parts], faces) if is_list else ([parts], [faces])
     if len(own) != len(of):
         _arrays.fail(ValueError, "parts", f"{len(own)} meshes", f"a list of {len(of)}, as faces are")
     found = []

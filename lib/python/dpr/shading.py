@@ -48,7 +48,8 @@ def unit(vectors: Tensor) -> Tensor:
     _require("vectors", vectors, (3,), "[..., 3]")
     squared = vectors.square().sum(-1, keepdim=True)
     is_vector = squared > _LEAST**2
-    return torch.where(is_vector, vectors, torch.zeros_like(vectors)) / torch.where(is_vector, squared, torch.ones_like(squared)).sqrt()
+    length = torch.where(is_vector, squared, torch.ones_like(squared)).sqrt()
+    return torch.where(is_vector, vectors, torch.zeros_like(vectors)) / length
 
 
 def _dot(a, b):
