@@ -146,7 +146,7 @@ class ArraySetters {
   void set_materials(std::size_t mesh, std::span<const Material> materials) {
     set({ArrayId::materials, mesh}, materials);
   }
-  /// From 0 to 1, for a mesh that has some: [vertex] or [face]. Below 1 they need noise of the triangles.
+  /// From 0 to 1, for a mesh that has some: [vertex] or [face]. Below 1 they need the joint composition.
   void set_opacities(std::size_t mesh, std::span<const float> opacities) {
     set({ArrayId::opacities, mesh}, opacities);
   }

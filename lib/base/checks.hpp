@@ -51,6 +51,21 @@ inline std::size_t first_not_finite(std::span<const float> numbers) {
   return numbers.size();
 }
 
+/// Throws for an enumerator beyond the last.
+template <typename Enum>
+void require_enumerator(Enum value, Enum last, const std::string& name) {
+  const auto number = static_cast<int>(value), most = static_cast<int>(last);
+  if (number < 0 || number > most)
+    throw InvalidArgument(name, std::to_string(number), "an enumerator, 0 to " + std::to_string(most));
+}
+
+/// Throws for no channels, and for more than any image has, whose products might not be numbers.
+inline void require_channels(std::size_t channels, const std::string& name) {
+  constexpr std::size_t k_most_channels = std::size_t{1} << 20;
+  if (channels < 1 || channels > k_most_channels)
+    throw InvalidArgument(name, std::to_string(channels), "1 to " + std::to_string(k_most_channels));
+}
+
 /// Throws unless there are as many, all of them finite.
 inline void require_numbers(std::span<const float> numbers, std::size_t count, const std::string& name) {
   if (numbers.size() != count)

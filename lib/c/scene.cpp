@@ -45,7 +45,8 @@ Camera to_camera(const dpr_camera* camera, const char* argument) {
                    .intrinsics = {},
                    .znear = c.znear,
                    .zfar = c.zfar};
-  if (c.fx != 0) converted.intrinsics = Intrinsics{c.fx, c.fy, c.cx, c.cy};
+  if (c.fx != 0 || c.fy != 0 || c.cx != 0 || c.cy != 0)
+    converted.intrinsics = Intrinsics{c.fx, c.fy, c.cx, c.cy};
   if (c.distortion != nullptr && c.fisheye != nullptr)
     throw InvalidArgument(checks::in("distortion and fisheye", argument), "both", "one of them, or none");
   if (const float* const k = c.distortion) converted.distortion = Distortion{k[0], k[1], k[2], k[3], k[4]};
@@ -118,7 +119,8 @@ Texture to_texture(const dpr_texture& given, const float* opacities, const std::
 
 /// Copies the mesh's textures; validate() checks how their parts fit.
 void copy_textures(const dpr_mesh& given, Mesh& mesh) {
-  if (given.texcoords) {
+  if (given.texcoords || given.texcoord_count > 0) {
+    deref(given.texcoords, "mesh.texcoords");
     require_count(given.texcoord_count, "mesh.texcoord_count");
     mesh.texcoords = to_pairs({given.texcoords, 2 * given.texcoord_count});
   }

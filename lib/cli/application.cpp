@@ -9,6 +9,7 @@
 
 #include "base/name_list.hpp"
 #include "cli/completion.hpp"
+#include "cli/file_options.hpp"
 #include "cli/option_names.hpp"
 #include "cli/process.hpp"
 #include "dpr/error.hpp"
@@ -211,6 +212,7 @@ int run(CLI::App& application, int argc, char** argv) {
     return 0;
   }
   refuse_empty_numbers(application);
+  refuse_shared_files(application);
   try {
     application.parse(argc, argv);
     return 0;

@@ -43,8 +43,9 @@ void check_weights(const LossWeights& weights, bool may_be_0) {
 void check_targets(std::span<const Image> targets) {
   if (targets.empty()) throw InvalidArgument("targets (loss)", "none", "one image a view");
   for (const Image& image : targets) {
-    if (image.width < 1 || image.height < 1 || image.width != targets[0].width ||
-        image.height != targets[0].height) {
+    if (image.width < 1 || image.height < 1)
+      throw InvalidArgument("target size (loss)", checks::size(image.width, image.height), "at least 1x1");
+    if (image.width != targets[0].width || image.height != targets[0].height) {
       throw InvalidArgument("target size (loss)", checks::size(image.width, image.height),
                             "images of one size, " + checks::size(targets[0].width, targets[0].height));
     }

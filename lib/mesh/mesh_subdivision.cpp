@@ -224,6 +224,7 @@ void require_same_counts(const Mesh& mesh, const MeshSubdivision& subdivision) {
 std::vector<float> Combinations::combine(std::span<const float> values, std::size_t channels) const {
   require_at_least(old_count_of(of) * channels, values.size(), "values");
   if (of.empty()) return {values.begin(), values.end()};
+  require_at_least(of.size(), weights.size(), "weights");
   std::vector<float> result;
   result.reserve(of.size() * channels);
   for (std::size_t i = 0; i < of.size(); ++i) {

@@ -26,14 +26,16 @@ Attribute parse_attribute(std::string_view word, std::string_view where) {
   return static_cast<Attribute>(position_of(word, k_attribute_names, std::string(where)));
 }
 
-AttributeImages::AttributeImages(const Device& device, Attribute attribute)
-    : impl_(std::make_unique<Impl>(device, attribute,
-                                   attribute == Attribute::depth       ? 1
-                                   : attribute == Attribute::texcoords ? 2
-                                                                       : 3)) {}
+AttributeImages::AttributeImages(const Device& device, Attribute attribute) {
+  checks::require_enumerator(attribute, Attribute::texcoords, "attribute (attribute images)");
+  impl_ = std::make_unique<Impl>(device, attribute,
+                                 attribute == Attribute::depth       ? 1
+                                 : attribute == Attribute::texcoords ? 2
+                                                                     : 3);
+}
 
 AttributeImages::AttributeImages(const Device& device, std::size_t channels, std::span<const float> values) {
-  if (channels == 0) throw InvalidArgument("channels (attribute images)", "0", "at least 1");
+  checks::require_channels(channels, "channels (attribute images)");
   impl_ = std::make_unique<Impl>(device, std::nullopt, channels);
   set_values(values);
 }

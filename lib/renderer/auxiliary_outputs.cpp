@@ -6,6 +6,7 @@
 #include <string>
 #include <type_traits>
 
+#include "base/checks.hpp"
 #include "base/name_list.hpp"
 #include "renderer/on_device.hpp"
 
@@ -132,7 +133,17 @@ void copy_aov(Renderer& renderer, Aov aov, const BufferSpan& outputs, const Even
 
 Image aov_image(const AuxiliaryOutputs& outputs, Aov aov) {
   if (aov == Aov::uv && outputs.uv.empty()) throw no_texcoords();
+  checks::require_enumerator(aov, Aov::effective_faces, "aov (aov_image)");
   Image image(outputs.width, outputs.height);
+  const auto require_pixels = [&](std::size_t count) {
+    if (count != image.pixels.size())
+      throw InvalidArgument("outputs (aov_image)", std::to_string(count) + " pixels",
+                            std::to_string(image.pixels.size()));
+  };
+  for (const std::size_t count : {outputs.depth.size(), outputs.normal.size(), outputs.face_id.size(),
+                                  outputs.barycentrics.size(), outputs.effective_faces.size()})
+    require_pixels(count);
+  if (!outputs.uv.empty()) require_pixels(outputs.uv.size());
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {
     const auto value = [&]() -> glm::vec3 {
       switch (aov) {

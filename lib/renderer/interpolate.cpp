@@ -21,7 +21,7 @@ class Table {
         of_view_(samples.size().width * samples.size().height),
         views_(samples.size().count / std::max<std::size_t>(of_view_ * samples.size().layers, 1)) {
     if (views_ == 0) throw InvalidArgument("samples (interpolate)", "none", "some");
-    if (attributes.channels == 0) throw InvalidArgument("channels (interpolate)", "0", "at least 1");
+    checks::require_channels(attributes.channels, "channels (interpolate)");
     faces_ = attributes.faces_are_of_views ? rows_of_views(attributes.faces.size(), 1, "faces") : 0;
     row_stride_ =
         attributes.are_of_views ? rows_of_views(attributes.values.size(), attributes.channels, "values") : 0;
@@ -152,6 +152,8 @@ SampleArrays::SampleArrays(const Samples& samples)
       places_(samples.barycentrics.data()),
       steps_(samples.steps.empty() ? nullptr : samples.steps.data()) {
   const auto is_wrong = [&](std::size_t count) { return count != size_.count; };
+  if (samples.layers < 1)
+    throw InvalidArgument("layers (interpolate)", std::to_string(samples.layers), "at least 1");
   if (is_wrong(samples.barycentrics.size()) || (steps_ && is_wrong(samples.steps.size())))
     throw InvalidArgument("samples (interpolate)",
                           std::to_string(size_.count) + " faces, " +

@@ -71,7 +71,7 @@ void Renderer::Impl::require_image() {
 }
 
 void Renderer::Impl::require_values(std::span<const float> samples, std::size_t channels) const {
-  if (channels == 0) throw InvalidArgument("channels (resolve)", "0", "at least 1");
+  checks::require_channels(channels, "channels (resolve)");
   checks::require_numbers(samples, channels * views.size() * frame.width * frame.height, "samples (resolve)");
 }
 

@@ -59,6 +59,7 @@ void Renderer::set_lights(const std::optional<Lights>& lights) {
 
 void Renderer::set_cull(Cull cull) {
   impl_->require_scene("Renderer::set_cull");
+  checks::require_enumerator(cull, Cull::front, "cull (Renderer::set_cull)");
   impl_->set_cull(cull);
 }
 

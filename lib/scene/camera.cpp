@@ -45,6 +45,7 @@ void validate(const Distortion& d, const std::string& name) {
   const std::pair<const char*, float> coefficients[] = {{"k1", d.k1}, {"k2", d.k2}, {"p1", d.p1},
                                                         {"p2", d.p2}, {"k3", d.k3}, {"k4", d.k4}};
   for (const auto& [key, value] : coefficients) checks::require_finite(value, checks::in(key, name));
+  checks::require_enumerator(d.model, LensModel::fisheye, checks::in("model", name));
   const auto require_zero = [&](float value, const char* key, const char* of) {
     if (value != 0)
       throw InvalidArgument(checks::in(key, name), checks::text(value), std::string("0 of ") + of);

@@ -55,6 +55,7 @@ void validate(const Scene& scene) {
   validate_side(scene.width, "width (scene)");
   validate_side(scene.height, "height (scene)");
   validate(scene.camera);
+  checks::require_enumerator(scene.cull, Cull::front, "cull (scene)");
   checks::require_finite(scene.background, "background (scene)");
   if (scene.meshes.empty()) throw InvalidArgument("meshes (scene)", "none", "at least one");
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {

@@ -19,6 +19,7 @@ void require_learning_rate(double learning_rate) {
 
 Optimizer::Optimizer(const OptimizerOptions& options) : options_(options) {
   require_learning_rate(options.learning_rate);
+  checks::require_enumerator(options.kind, OptimizerKind::uniform_adam, "kind (optimizer)");
   require(options.beta1 >= 0 && options.beta1 < 1, "beta1 (optimizer)", options.beta1, "a number in [0, 1)");
   require(options.beta2 >= 0 && options.beta2 < 1, "beta2 (optimizer)", options.beta2, "a number in [0, 1)");
   require(options.epsilon > 0 && std::isfinite(options.epsilon), "epsilon (optimizer)", options.epsilon,
@@ -66,6 +67,10 @@ void Optimizer::restart() { state_ = {}; }
 void Optimizer::set_state(OptimizerState state) {
   require(state.first_moment.size() == state.second_moment.size(), "length of the moments (optimizer)",
           state.second_moment.size(), "that of the first moment");
+  const auto is_finite = [](double moment) { return std::isfinite(moment); };
+  if (!std::ranges::all_of(state.first_moment, is_finite) ||
+      !std::ranges::all_of(state.second_moment, is_finite))
+    throw InvalidArgument("moments (optimizer)", "numbers that are not finite", "finite ones");
   state_ = std::move(state);
 }
 

@@ -27,7 +27,8 @@ namespace {
 
 const Mesh& template_of(const ShapeViews& views) {
   if (!views.initial)
-    throw InvalidArgument("initial mesh (photographs)", "none", "a template, or a camera in every view");
+    throw InvalidArgument("initial mesh (photographs)", "none",
+                          "a mesh to begin with, by which missing cameras and light are found");
   validate(*views.initial, "initial (photographs)");
   require_opaque(*views.initial, "initial mesh");
   return *views.initial;

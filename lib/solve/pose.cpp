@@ -21,13 +21,15 @@
 namespace dpr {
 namespace {
 
-void require_rotation(const glm::dmat3& rotation) {
+void require_initial(const Pose& pose) {
   constexpr double k_tolerance = 1e-3;  // what the rounding of a matrix written with a few digits leaves
+  const glm::dmat3& rotation = pose.rotation;
   const glm::dmat3 excess = glm::transpose(rotation) * rotation - glm::dmat3(1.0);
   double error = 0;
   for (int c = 0; c < 3; ++c) error += glm::dot(excess[c], excess[c]);
   require(std::sqrt(error) < k_tolerance && glm::determinant(rotation) > 0, "initial rotation (pose)",
           std::sqrt(error), "an orthonormal matrix with determinant 1 (shown: |R^T R - 1|)");
+  checks::require_finite(glm::vec3(pose.translation), "initial translation (pose)");
 }
 
 void validate_meshes(const Scene& scene, const std::vector<std::size_t>& meshes) {
@@ -130,7 +132,7 @@ unsigned PoseSolver::most_iterations() const {
 
 PoseResult PoseSolver::solve(const Pose& initial, const Callback& callback) const {
   if (std::holds_alternative<LeastSquares>(options_.method)) return solve(std::span(&initial, 1), callback);
-  require_rotation(initial.rotation);
+  require_initial(initial);
   const Pose first{polar_decomposition(initial.rotation).rotation, initial.translation};
   return timed([&] { return descend_to_pose(device_, scene_, target_, options_, first, callback); });
 }
@@ -140,7 +142,7 @@ PoseResult PoseSolver::solve(std::span<const Pose> initial, const Callback& call
   require(!initial.empty(), "initial poses (pose)", initial.size(), "at least one");
   std::vector<Pose> poses;
   for (const Pose& pose : initial) {
-    require_rotation(pose.rotation);
+    require_initial(pose);
     poses.push_back({polar_decomposition(pose.rotation).rotation, pose.translation});
   }
   return timed([&] { return fit_pose(device_, problems(), poses, Foreknowledge::start, callback).result; });

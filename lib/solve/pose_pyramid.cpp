@@ -56,6 +56,8 @@ void validate(const LeastSquares& options, const Scene& scene) {
   require(options.rotations <= k_most_rotations, "rotations (pose)", options.rotations, "at most 2^24");
   require(options.coarsest > 0, "coarsest (pose)", options.coarsest, "at least 1");
   require(options.iterations > 0, "iterations (pose)", options.iterations, "at least 1");
+  checks::require_enumerator(options.noise, Noise::pixel, "noise (pose)");
+  checks::require_enumerator(options.light, PoseLight::harmonics, "light (pose)");
   require(options.blur > 0 && std::isfinite(options.blur), "blur (pose)", options.blur,
           "a finite number above 0");
   require(options.blur_end > 0 && std::isfinite(options.blur_end), "blur_end (pose)", options.blur_end,

@@ -63,6 +63,7 @@ void check_shape_options(const ShapeOptions& o, const ShapeViews& views) {
     throw InvalidArgument("loss (shape)", "one of silhouettes alone, and a view without",
                           "one of colours too");
   }
+  checks::require_enumerator(o.steps, ShapeSteps::direct, "steps (shape)");
   require(not_negative(o.lambda), "lambda (shape)", o.lambda, "a finite number, at least 0");
   require(positive(o.learning_rate), "learning_rate (shape)", o.learning_rate, "a finite number above 0");
   require(positive(o.learning_rate_end), "learning_rate_end (shape)", o.learning_rate_end,

@@ -860,6 +860,14 @@ static void test_frame_tangents(void) {
   REFUSED(dpr_frame_tangent(frame, 2, moved, 1, tangents, 2 * FLOATS), "finite");
   REFUSED(dpr_frame_tangent(NULL, 2, moved, 1, tangents, 2 * FLOATS), "frame");
   dpr_frame_destroy(frame);
+  {
+    static const char* const twice[] = {"sigma=1e-3", "preset=pixel", "sigma=1e-2"};
+    static const char* const unknown[] = {"vertices", "vertexes"};
+    options.gradients = unknown;
+    REFUSED(dpr_frame_render(&options, arrays, 4, &frame), "\"vertexes\"");
+    options.settings = twice, options.setting_count = 3;
+    REFUSED(dpr_frame_check(&options), "sigma");
+  }
 }
 
 /* Of the samples with a face alone, in a frame whose samples these are: as of all samples. */

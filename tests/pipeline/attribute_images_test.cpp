@@ -580,6 +580,8 @@ TEST_SUITE("robustness") {
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, numbers.set_values(bad), "values[1]");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, images.set_values(bad), "texcoords");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, AttributeImages(device, 0, {}), "channels");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, AttributeImages(device, std::size_t{1} << 61, {}), "channels");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, AttributeImages(device, static_cast<Attribute>(9)), "got 9");
     AttributeImages depth(device, Attribute::depth);
     depth.forward(renderer);
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, depth.image(1), "below 1");

@@ -473,6 +473,7 @@ TEST_SUITE("pipeline") {
     renderer.forward();
     const std::size_t count = renderer.samples().faces.size();
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.resolve(std::vector<float>(count), 0), "channels");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.resolve({}, std::size_t{1} << 62), "channels");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, renderer.resolve(std::vector<float>(count - 1), 1),
                           "samples (resolve)");
     std::vector<float> bad(count);

@@ -170,6 +170,28 @@ TEST_SUITE("robustness") {
                 {"render", "cube.ply", "-o", "a.png", "c.png"});
   }
 
+  TEST_CASE("cli: a file that another option names is not written over") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    fs::create_symlink("scene.json", folder / "link.json");
+    const std::string mesh = folder.read("cube.ply"), scene = folder.read("scene.json");
+    check_fails(folder, 1,
+                "--save-scene (command line): got \"cube.ply\", the file of MESH, expected another",
+                {"render", "cube.ply", "-o", "a.png", "--save-scene", "cube.ply"});
+    check_fails(folder, 1, "--output (command line): got \"a.png\", the file of --save-scene",
+                {"render", "cube.ply", "-o", "a.png", "--save-scene", "./a.png"});
+    check_fails(folder, 1, "got \"target.exr\", the file of --target",
+                {"pose", "--scene", "scene.json", "--target", "target.exr", "-o", "target.exr"});
+    check_fails(folder, 1, "got \"link.json\", the file of --scene",
+                {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "link.json"});
+    CHECK(folder.read("cube.ply") == mesh);
+    CHECK(folder.read("scene.json") == scene);
+    CHECK(run_command(folder,
+                      {"gradient", "--scene", "scene.json", "--target", "target.exr", "-o", "/dev/null"})
+              .status == 0);
+  }
+
   TEST_CASE("cli: without arguments it prints its help") {
     if (is_skipped()) return;
     const TempDir folder;

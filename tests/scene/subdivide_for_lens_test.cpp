@@ -389,6 +389,10 @@ TEST_SUITE("unit") {
                           "faces (subdivided mesh): got");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.combine({}, 1), "values (subdivided mesh)");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, cut.meshes[0].vertices.pull_back({}, 4, 1), "gradient");
+    Combinations without_weights;
+    without_weights.of = {glm::uvec3(0)};
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, without_weights.combine(std::vector<float>(1), 1),
+                          "weights (subdivided mesh): got 0");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back({}, cut, {}), "meshes (subdivided scene)");
     AuxiliaryOutputs outputs;
     outputs.face_id = {1 << 20};

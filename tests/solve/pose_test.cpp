@@ -13,6 +13,7 @@
 #include "dpr/error.hpp"
 #include "dpr/renderer.hpp"
 #include "dpr/subdivision.hpp"
+#include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
 
@@ -434,6 +435,8 @@ TEST_SUITE("robustness") {
       CHECK_THROWS_AS(solver.solve({glm::dmat3(-1.0), {}}), dpr::InvalidArgument);
       const double nan = std::numeric_limits<double>::quiet_NaN();
       CHECK_THROWS_AS(solver.solve({glm::dmat3(nan), {}}), dpr::InvalidArgument);
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, solver.solve({glm::dmat3(1.0), glm::dvec3(0, 0, nan)}),
+                            "initial translation (pose)");
       CHECK_THROWS_AS(solver.solve(std::span<const dpr::Pose>()), dpr::InvalidArgument);
     }
     const dpr::PoseSolver descending(device, cube_scene(16), dpr::Image(16, 16), descent(1));

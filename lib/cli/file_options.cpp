@@ -1,0 +1,49 @@
+#include "cli/file_options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "dpr/error.hpp"
+
+namespace dpr::cli {
+namespace {
+
+bool is_written(const CLI::Option& option) {
+  constexpr std::array<std::string_view, 5> k_written{"--output", "--save-scene", "--save-views", "--csv",
+                                                      "--checkpoint"};
+  return std::ranges::any_of(k_written,
+                             [&](std::string_view name) { return option.check_name(std::string(name)); });
+}
+
+/// True of two names of a file that is there, or is to be.
+bool are_one_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code error;
+  if (exists(a, error) && exists(b, error)) return is_regular_file(a, error) && equivalent(a, b, error);
+  return weakly_canonical(a, error) == weakly_canonical(b, error);
+}
+
+void require_files_apart(const CLI::App& command) {
+  for (const CLI::Option* written : command.get_options()) {
+    if (!is_written(*written) || written->results().empty()) continue;
+    const std::string file = written->results().front();
+    for (const CLI::Option* other : command.get_options()) {
+      if (other == written ||
+          std::ranges::none_of(other->results(), [&](const std::string& f) { return are_one_file(file, f); }))
+        continue;
+      throw InvalidArgument(written->get_name() + " (command line)",
+                            "\"" + file + "\", the file of " + other->get_name(), "another file");
+    }
+  }
+}
+
+}  // namespace
+
+void refuse_shared_files(CLI::App& command) {
+  command.parse_complete_callback([&command] { require_files_apart(command); });
+  for (CLI::App* other : command.get_subcommands({})) refuse_shared_files(*other);
+}
+
+}  // namespace dpr::cli
