@@ -77,8 +77,11 @@ struct LeastSquares {
   float robust_scale = 0;
   /// Anything may lie behind the object, as in a photograph: nothing is compared with the scene's background. A
   /// pixel that the object does not cover leaves 0.7 of what one of quite another colour does; outside of `box`, and
-  /// 3% of its larger side, one that it covers does. Without a box the object may grow over all that its light can
-  /// explain: it is never explained where it fills the picture. Takes a robust loss, colours, and no silhouette.
+  /// 3% of its larger side, one that it covers does. In the box colours count too, with the probability p that a pixel
+  /// shows what is in the box, by histograms of what lies in it and beside it: one that is not covered leaves sqrt(2 p)
+  /// as much, and one that is covered 2 (1 - 2 p) more where p is below a half. Without a box the object may grow over
+  /// all that its light can explain: it is never explained where it fills the picture. Takes a robust loss, colours,
+  /// and no silhouette.
   bool unknown_background = false;
   /// Found along with the pose, in closed form for every hypothesis, as long as the scene's own light does
   /// not explain the target.

@@ -24,9 +24,11 @@ inline Vec3d corner_opacities(const Mesh& mesh, std::size_t face) {
 inline BaseColor opacity_base(BaseColor base, const Mesh& mesh, std::size_t face) {
   const Vec3d corners = corner_opacities(mesh, face);
   for (std::size_t i = 0; i < 3; ++i) base.corners[i] = {corners[i], corners[i], corners[i]};
+  base.texture = nullptr;
   const int texture = face_texture(mesh, face);
-  base.texture = texture < 0 ? nullptr : &mesh.opacity_textures[static_cast<std::size_t>(texture)];
-  if (base.texture && base.texture->texels.empty()) base.texture = nullptr;
+  if (texture < 0 || mesh.opacity_textures.empty()) return base;
+  const Texture& opacities = mesh.opacity_textures[static_cast<std::size_t>(texture)];
+  if (!opacities.texels.empty()) base.texture = &opacities;
   return base;
 }
 

@@ -28,7 +28,7 @@ struct Mesh {
   std::vector<std::size_t> face_materials{};  ///< one per face; empty: all faces have the first
   std::vector<double> vertex_opacities{};     ///< one per vertex, or empty
   std::vector<double> face_opacities{};       ///< one per face, or empty; without any the mesh is opaque
-  std::vector<Texture> opacity_textures{};    ///< one per texture, three times the same; no texels: opaque
+  std::vector<Texture> opacity_textures{};    ///< one per texture, or none, three times the same; no texels: opaque
 };
 
 struct Smoothing {

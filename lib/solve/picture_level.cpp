@@ -10,6 +10,7 @@
 #include "solve/level_scene.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/resample.hpp"
+#include "solve/unknown_background.hpp"
 
 namespace dpr {
 namespace {
@@ -59,26 +60,6 @@ void give_normals(Scene& scene, const PoseBody& body, CornerNormals normals,
   }
 }
 
-/// Part of every pixel, in images of a level's size, that may show the object: that which lies in the box, or close to
-/// it, as boxes are not exact; all without one.
-Image allowed(const std::optional<PoseBox>& box, const Scene& scene, int width, int height) {
-  constexpr float k_slack = 0.03F;  // of the larger side
-  Image image(width, height, glm::vec4(1));
-  if (!box) return image;
-  const glm::vec2 scale = glm::vec2(width, height) / glm::vec2(scene.width, scene.height);
-  const float slack = k_slack * std::max(box->width, box->height);
-  const glm::vec2 low = scale * (glm::vec2(box->x, box->y) - slack);
-  const glm::vec2 high = scale * (glm::vec2(box->x + box->width, box->y + box->height) + slack);
-  for (int row = 0; row < height; ++row) {
-    for (int column = 0; column < width; ++column) {
-      const glm::vec2 at(column, row);
-      const glm::vec2 shared = glm::clamp(glm::min(at + 1.0F, high) - glm::max(at, low), 0.0F, 1.0F);
-      image.at(column, row).x = shared.x * shared.y;
-    }
-  }
-  return image;
-}
-
 /// That of one of sixteen is less: the very best may fit by luck. Empty: 0.
 float best_of(std::vector<float> numbers) {
   constexpr std::ptrdiff_t k_best = 16;
@@ -126,7 +107,8 @@ PictureLevel::PictureLevel(const Device& device, const Scene& scene, const Image
   target_.has_unknown_background = has_unknown_background_;
   mask_ = options.mask.pixels.empty() ? Image(width(), height(), glm::vec4(1))
                                       : resample(options.mask, width(), height());
-  if (has_unknown_background_) allowed_ = allowed(options.box, scene, width(), height());
+  if (has_unknown_background_)
+    covered_ = coverage_before_unknown(target, options.mask, options.box, width(), height());
   for (const glm::vec4& p : mask_.pixels) target_.weights.push_back(counts_colors_ ? p.x : 0);
   resample_images({target, options.silhouette.image, options.depth.image});
   sums_.emplace(device, target_, light, space_.size());
@@ -164,7 +146,7 @@ std::vector<cl_float4> PictureLevel::measured(const PictureImages& images) const
     for (glm::vec4& p : silhouette.pixels) p.x = p.w;
   }
   for (glm::vec4& p : silhouette.pixels) p.w = 1;
-  if (has_unknown_background_) add(allowed_, k_coverage);
+  if (has_unknown_background_) add(covered_, k_coverage);
   if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
   if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
   return result;

@@ -115,7 +115,7 @@ class PictureLevel {
   std::vector<Hypothesis> shown_;         // by all images
   bool counts_colors_, trusts_coverage_;  // less, of one that is guessed from depths
   bool has_unknown_background_, weighs_observations_;
-  Image mask_, allowed_;  // of the level's size; where the object may be, if the background is not known
+  Image mask_, covered_;  // of the level's size; what should be covered, if the background is not known
   std::array<float, 2> factors_;  // on the weights of coverage and depth
   WeighedTarget target_;
   std::optional<NormalSums> sums_;

@@ -74,6 +74,8 @@ class CamerasTest(unittest.TestCase):
         for wrong in ((EYE, EYE), (EYE, TARGET, EYE - TARGET), (EYE, TARGET, [0, 0, 0]), (EYE[:2],)):
             with self.assertRaisesRegex(ValueError, "dpr.cameras"):
                 dpr.look_at(*wrong)
+        with self.assertRaisesRegex(TypeError, "'origin'.*lists of numbers"):
+            dpr.look_at("origin")
 
     def test_from_opengl(self):
         off_centre = glu_perspective(40)

@@ -203,6 +203,8 @@ class EnvironmentTest(unittest.TestCase):
                                (random(8, 16, 3).numpy(), "ndarray.*a tensor of PyTorch")):
             with self.assertRaisesRegex(ValueError, r"image \(dpr.shading\): got " + message + r".*\[H, 2 H, 3\]"):
                 shading.Environment(image)
+        with self.assertRaisesRegex(ValueError, r"image \(dpr.shading\): got numbers that are not finite"):
+            shading.Environment(torch.full((8, 16, 3), float("nan")))
         with self.assertRaisesRegex(ValueError, "vertices.*a tensor of PyTorch"):
             shading.vertex_normals(random(4, 3).numpy(), torch.tensor([[0, 1, 2]]))
 

@@ -85,6 +85,20 @@ dpr::LeastSquares before_anything(dpr::PoseLight light) {
   return method;
 }
 
+/// About what an image shows.
+dpr::PoseBox box_of(const dpr::Image& image) {
+  glm::ivec2 low(image.width, image.height), high(0);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      if (image.at(x, y).w < 0.5F) continue;
+      low = glm::min(low, glm::ivec2(x, y));
+      high = glm::max(high, glm::ivec2(x + 1, y + 1));
+    }
+  }
+  const glm::vec2 corner(low), size(high - low);
+  return {corner.x, corner.y, size.x, size.y};
+}
+
 const dpr::Pose k_truth{dpr::rotation_from_vector({0.3, 0.6, 0.1}), {0.2, -0.1, 0.3}};
 
 /// So far from the truth.
@@ -120,6 +134,32 @@ TEST_SUITE("pipeline") {
       CHECK_FALSE(absent.explained);
       CHECK(absent.unexplained_part > 0.4);
     }
+  }
+
+  TEST_CASE(
+      "an object of one colour in a light of its own ends at its outline, where its box has other colours") {
+    const dpr::Device device = dpr::open_device();
+    dpr::Scene scene = cube_scene();
+    dpr::Mesh& mesh = scene.meshes[0].mesh;
+    for (glm::vec3& p : mesh.positions) p *= glm::vec3(1, 0.7F, 0.45F);
+    mesh.face_colors.assign(mesh.faces.size(), glm::vec3(1));
+    dpr::Scene lit = scene;
+    dpr::Lights lights{.ambient = {0.3F, 0.15F, 0.02F}};
+    lights.directional.push_back(
+        {.direction = glm::normalize(glm::vec3(-1, -1.2F, -1)), .diffuse = {0.5F, 0.25F, 0.03F}});
+    lit.lights = lights;
+    const dpr::Image target = photograph(device, lit, k_truth);
+    dpr::LeastSquares method = before_anything(dpr::PoseLight::harmonics);
+    method.rotations = 0;
+    const dpr::Image alone = dpr::test::rigid_image(device, placed(lit, k_truth));
+    method.box = box_of(alone);
+    const dpr::PoseOptions options{.method = method, .solve_translation = true};
+    const dpr::Pose start = moved(0.1, {0, 0.05, 0.4});
+    const dpr::PoseResult found = dpr::PoseSolver(device, scene, target, options).solve(start);
+    if (is_reduced()) return;
+    CHECK(dpr::angle_degrees(found.pose.rotation, k_truth.rotation) < 2);
+    CHECK(glm::distance(found.pose.translation, k_truth.translation) < 0.06);
+    CHECK(found.explained);
   }
 
   TEST_CASE(

@@ -25,6 +25,13 @@ def _fail(name, got, expected):
     _arrays.fail(ValueError, name, got, expected, "dpr.cameras")
 
 
+def _numbers(value):
+    try:
+        return np.asarray(value, np.float32)
+    except (TypeError, ValueError):
+        _arrays.fail(TypeError, "argument", repr(value), "an array, or nested lists of numbers", "dpr.cameras")
+
+
 def _together(*values):
     """(module with functions of arrays, the values as its arrays of one type)"""
     homes = {_arrays.module_of(value): value for value in reversed(values) if _arrays.is_array(value)}
@@ -35,7 +42,7 @@ def _together(*values):
                        for value in values]
     if "jax" in homes:
         return sys.modules["jax"].numpy, [sys.modules["jax"].numpy.asarray(value, np.float32) for value in values]
-    arrays = [_arrays.to_numpy(value) if _arrays.is_array(value) else np.asarray(value, np.float32) for value in values]
+    arrays = [_arrays.to_numpy(value) if _arrays.is_array(value) else _numbers(value) for value in values]
     home_type = next((array.dtype for array in arrays if array.dtype == np.float64), np.float32)
     return np, [array.astype(home_type) for array in arrays]
 

@@ -220,7 +220,8 @@ class Environment:
     Reflections are Karis' split sum: means of the image by GGX for six degrees of roughness, each of 32 x 64 directions, and
     shares of an even light. A mirror has the image itself. Beside sums over all directions they are 2% off in an even light;
     where light and dark share the sky 3% along the normal, and 15% for a rough metal seen aslant. The means are linear in the
-    image and have its derivatives; the first use in a process takes a second. Raises ValueError for another shape.
+    image and have its derivatives; the first use in a process takes a second. Raises ValueError for another shape, and for
+    numbers that are not finite.
     """
 
     _HEIGHT, _LEVELS = 32, 6
@@ -229,6 +230,8 @@ class Environment:
         _require("image", image, (3,), "[H, 2 H, 3]")
         if image.ndim != 3 or image.shape[1] != 2 * image.shape[0] or not image.shape[0]:
             _fail("image", list(image.shape), "[H, 2 H, 3]")
+        if not image.detach().isfinite().all():
+            _fail("image", "numbers that are not finite", "finite ones")
         self.image = image
         self._with_poles = _with_poles(image)
         size = (self._HEIGHT, 2 * self._HEIGHT)
