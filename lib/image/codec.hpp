@@ -40,15 +40,14 @@ class StoredImages {
   virtual bool next(Image& image, PixelFacts& facts) = 0;
 };
 
-/// Functions of a codec module. They throw std::runtime_error with the reason. `read` is null in a module
-/// that only writes.
+/// Functions of a codec module. They throw std::runtime_error with the reason.
 struct ImageCodec {
   /// The pixels as they are stored, finite or not; whole numbers from 0 to 1. Without `content` those of a file;
-  /// else `file` is the name of the content's format.
+  /// else `file` is the name of the content's format. An empty image: another module has to read it.
   Image (*read)(const std::string& file, std::span<const unsigned char> content, PixelFacts& facts);
   /// The content of a file of a valid image, in memory.
   std::vector<unsigned char> (*encode)(const Image& image, const PixelFormat& format);
-  /// Null in a module that only writes.
+  /// Null in a module that reads no videos.
   std::unique_ptr<StoredImages> (*read_all)(const std::string& file);
 };
 

@@ -78,17 +78,27 @@ const ImageCodec& openimageio() {
   return codec;
 }
 
-/// PNG is what most images are written as: libpng alone is loaded in no time.
+/// PNG is what most images are: libpng alone is loaded in no time.
 const ImageCodec& png() {
   static const ImageCodec& codec = load_codec("png");
   return codec;
 }
 
+std::span<const unsigned char> bytes_of(std::string_view content) {
+  return {reinterpret_cast<const unsigned char*>(content.data()), content.size()};
+}
+
 /// As ImageCodec::read. Messages call the file `name`.
-Image read_stored(const std::filesystem::path& name, const std::string& file,
-                  std::span<const unsigned char> content, PixelFacts& facts) {
+Image read_stored(const std::filesystem::path& name, const std::string& file, std::string_view content,
+                  PixelFacts& facts) {
+  const bool is_png_file = content.empty() && lower_case_extension(name) == ".png";
+  const std::string of_file = is_png_file ? read_file(name) : std::string();
+  const std::string_view of_png = file == "png" ? content : of_file;
   try {
-    return openimageio().read(file, content, facts);
+    if (!of_png.empty()) {
+      if (Image image = png().read("png", bytes_of(of_png), facts); !image.pixels.empty()) return image;
+    }
+    return openimageio().read(file, bytes_of(content), facts);
   } catch (const std::runtime_error& error) {
     throw IoError(name, error.what());
   }
@@ -104,7 +114,7 @@ Image linear(const std::filesystem::path& name, Image image, Encoding encoding, 
 }
 
 /// As read_stored(), finite and linear.
-Image read(const std::filesystem::path& name, const std::string& file, std::span<const unsigned char> content,
+Image read(const std::filesystem::path& name, const std::string& file, std::string_view content,
            Encoding encoding, PixelFacts& facts) {
   return linear(name, read_stored(name, file, content, facts), encoding, facts);
 }
@@ -165,9 +175,7 @@ Texture decode_texture(const std::string& name, std::string_view content) {
   const bool is_png = content.starts_with("\x89PNG");
   if (!is_png && !content.starts_with("\xff\xd8")) throw IoError(name, "is neither a PNG nor a JPEG file");
   PixelFacts facts;
-  return texture_of(read(name, is_png ? "png" : "jpeg",
-                         {reinterpret_cast<const unsigned char*>(content.data()), content.size()},
-                         Encoding::srgb, facts));
+  return texture_of(read(name, is_png ? "png" : "jpeg", content, Encoding::srgb, facts));
 }
 
 void write_texture(const std::filesystem::path& file, const Texture& texture) {
