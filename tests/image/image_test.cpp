@@ -210,8 +210,62 @@ TEST_SUITE("robustness") {
                           "a.xyz: cannot be read");
   }
 
+  TEST_CASE("PNG files of other kinds than those that are written") {
+    const TempDir folder;
+    const auto read = [&](const std::string& digits) {
+      std::string bytes;
+      for (std::size_t i = 0; i < digits.size(); i += 2)
+        bytes += static_cast<char>(std::stoi(digits.substr(i, 2), nullptr, 16));
+      return read_image(folder.write("a.png", bytes), nullptr, Encoding::linear);
+    };
+    const Image grey = read(  // of 2 bits
+        "89504e470d0a1a0a0000000d494844520000000400000001020000000096e748b00000000a4944415478da63900600001d00"
+        "1c237c8fac"
+        "0000000049454e44ae426082");
+    REQUIRE(grey.pixels.size() == 4);
+    for (int i = 0; i < 4; ++i)
+      CHECK(grey.at(i, 0) == glm::vec4(glm::vec3(static_cast<float>(i) * 85 / 255), 1));
+    const Image with_alpha = read(  // grey and alpha of 16 bits
+        "89504e470d0a1a0a0000000d4948445200000001000000011004000000e58cd0410000000d4944415478da63103269600000"
+        "01e900c7a5"
+        "4989370000000049454e44ae426082");
+    REQUIRE(with_alpha.pixels.size() == 1);
+    CHECK(with_alpha.pixels[0] == glm::vec4(glm::vec3(4660.0F / 65535), 32768.0F / 65535));
+    const Image palette = read(  // whose first colour is a fifth opaque
+        "89504e470d0a1a0a0000000d49484452000000020000000108030000"
+        "00c3fc8fb800000006504c5445ff00000000ff6ca1fd8e0000000174524e5333ff36b9700000000b4944415478da63606004"
+        "000004"
+        "00022cde48ad0000000049454e44ae426082");
+    REQUIRE(palette.pixels.size() == 2);
+    CHECK(palette.at(0, 0) == glm::vec4(1, 0, 0, 51.0F / 255));
+    CHECK(palette.at(1, 0) == glm::vec4(0, 0, 1, 1));
+    const Image in_turns = read(  // Adam7
+        "89504e470d0a1a0a0000000d49484452000000020000000208020000018ad3aae50000000f4944415478da63f8cf00041002"
+        "0800"
+        "20ee05fb4c50558d0000000049454e44ae426082");
+    REQUIRE(in_turns.pixels.size() == 4);
+    CHECK(in_turns.at(0, 0) == glm::vec4(1, 0, 0, 1));
+    CHECK(in_turns.at(1, 0) == glm::vec4(0, 1, 0, 1));
+    CHECK(in_turns.at(0, 1) == glm::vec4(0, 0, 1, 1));
+    CHECK(in_turns.at(1, 1) == glm::vec4(1));
+  }
+
+  TEST_CASE("a file named PNG that is a JPEG file is read") {
+    const TempDir folder;
+    write_image(folder / "a.jpg", Image(8, 8, glm::vec4(0.3F)));
+    const Image image = read_image(folder.write("b.png", folder.read("a.jpg")));
+    REQUIRE(image.width == 8);
+    CHECK(image.pixels[0].x == doctest::Approx(0.3).epsilon(0.05));
+  }
+
   TEST_CASE("truncated images") {
     const TempDir folder;
+    write_image(folder / "a.png", Image(64, 64, glm::vec4(0.3F)));
+    std::string png = folder.read("a.png");
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.write("b.png", png.substr(0, png.size() - 20))),
+                          "b.png: cannot be read: the file ends too soon");
+    png.replace(16, 4, std::string("\0\0\x40\0", 4));  // 16384 pixels wide, without the sum that says so
+    DPR_CHECK_MESSAGE_HAS(IoError, read_image(folder.write("b.png", png)), "IHDR: CRC error");
     for (const std::string extension : {".png", ".exr", ".tif", ".tga", ".jpg"}) {
       write_image(folder / ("whole" + extension), Image(64, 64, glm::vec4(0.3F)));
       const std::string whole = folder.read("whole" + extension);
