@@ -96,10 +96,11 @@ Image decode(Decoder& decoder, std::size_t content_bytes, PixelFacts& facts) {
 
   const bool is_grey = channels < 3, has_alpha = channels % 2 == 0;
   facts = {.has_alpha = has_alpha, .floats = false, .largest = size == 2 ? 65535.0F : 255.0F};
+  const float unit = 1 / facts.largest;
   const auto value = [&](std::size_t pixel, std::size_t channel) {
     const png_byte* const at = bytes.data() + (pixel * channels + channel) * size;
     const unsigned number = size == 2 ? at[0] * 256U + at[1] : at[0];
-    return static_cast<float>(number) / facts.largest;
+    return static_cast<float>(number) * unit;
   };
   Image image(static_cast<int>(width), static_cast<int>(height), glm::vec4(1));
   for (std::size_t i = 0; i < image.pixels.size(); ++i) {

@@ -224,20 +224,20 @@ TEST_SUITE("robustness") {
         "0000000049454e44ae426082");
     REQUIRE(grey.pixels.size() == 4);
     for (int i = 0; i < 4; ++i)
-      CHECK(grey.at(i, 0) == glm::vec4(glm::vec3(static_cast<float>(i) * 85 / 255), 1));
+      CHECK(grey.at(i, 0) == glm::vec4(glm::vec3(static_cast<float>(85 * i) * (1.0F / 255)), 1));
     const Image with_alpha = read(  // grey and alpha of 16 bits
         "89504e470d0a1a0a0000000d4948445200000001000000011004000000e58cd0410000000d4944415478da63103269600000"
         "01e900c7a5"
         "4989370000000049454e44ae426082");
     REQUIRE(with_alpha.pixels.size() == 1);
-    CHECK(with_alpha.pixels[0] == glm::vec4(glm::vec3(4660.0F / 65535), 32768.0F / 65535));
+    CHECK(with_alpha.pixels[0] == glm::vec4(glm::vec3(4660 * (1.0F / 65535)), 32768 * (1.0F / 65535)));
     const Image palette = read(  // whose first colour is a fifth opaque
         "89504e470d0a1a0a0000000d49484452000000020000000108030000"
         "00c3fc8fb800000006504c5445ff00000000ff6ca1fd8e0000000174524e5333ff36b9700000000b4944415478da63606004"
         "000004"
         "00022cde48ad0000000049454e44ae426082");
     REQUIRE(palette.pixels.size() == 2);
-    CHECK(palette.at(0, 0) == glm::vec4(1, 0, 0, 51.0F / 255));
+    CHECK(palette.at(0, 0) == glm::vec4(1, 0, 0, 51 * (1.0F / 255)));
     CHECK(palette.at(1, 0) == glm::vec4(0, 0, 1, 1));
     const Image in_turns = read(  // Adam7
         "89504e470d0a1a0a0000000d49484452000000020000000208020000018ad3aae50000000f4944415478da63f8cf00041002"
