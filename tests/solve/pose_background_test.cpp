@@ -144,9 +144,11 @@ TEST_SUITE("pipeline") {
     for (glm::vec3& p : mesh.positions) p *= glm::vec3(1, 0.7F, 0.45F);
     mesh.face_colors.assign(mesh.faces.size(), glm::vec3(1));
     dpr::Scene lit = scene;
-    dpr::Lights lights{.ambient = {0.3F, 0.15F, 0.02F}};
-    lights.directional.push_back(
-        {.direction = glm::normalize(glm::vec3(-1, -1.2F, -1)), .diffuse = {0.5F, 0.25F, 0.03F}});
+    dpr::Lights lights;
+    lights.ambient = {0.3F, 0.15F, 0.02F};
+    dpr::DirectionalLight& sun = lights.directional.emplace_back();
+    sun.direction = glm::normalize(glm::vec3(-1, -1.2F, -1));
+    sun.diffuse = {0.5F, 0.25F, 0.03F};
     lit.lights = lights;
     const dpr::Image target = photograph(device, lit, k_truth);
     dpr::LeastSquares method = before_anything(dpr::PoseLight::harmonics);

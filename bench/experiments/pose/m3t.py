@@ -81,7 +81,7 @@ def triangle(arguments, folder):
             pose, said = find(arguments, folder, "triangle", start, ["--rotations", "0"])
             errors = [(angle_degrees(pose[:3, :3], truth[:3, :3]), 1000 * np.linalg.norm(pose[:3, 3] - truth[:3, 3]))
                       for truth in truths]
-            rows.append({"start_degrees": degrees, "degrees": min(errors)[0], "millimetres": min(errors)[1], **said})
+            rows.append({"start_degrees": degrees, "degrees": min(errors)[0], "millimetres": float(min(errors)[1]), **said})
             print(rows[-1], flush=True)
     return rows
 
