@@ -189,13 +189,7 @@ void set_from_text(RenderSettings& settings, const std::string& text) {
 RenderSettings settings_from_texts(std::int64_t width, std::int64_t height,
                                    const std::vector<std::string>& texts) {
   RenderSettings settings(width, height);
-  std::vector<std::string_view> names;
-  for (const std::string& text : texts) {
-    names.push_back(std::string_view(text).substr(0, text.find('=')));
-    if (std::ranges::count(names, names.back()) > 1)
-      throw InvalidArgument(std::string(names.back()) + " (batch)", "it twice among the settings", "it once");
-    set_from_text(settings, text);
-  }
+  for (const std::string& text : texts) set_from_text(settings, text);
   settings.require_parts();
   return settings;
 }

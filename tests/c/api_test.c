@@ -861,12 +861,9 @@ static void test_frame_tangents(void) {
   REFUSED(dpr_frame_tangent(NULL, 2, moved, 1, tangents, 2 * FLOATS), "frame");
   dpr_frame_destroy(frame);
   {
-    static const char* const twice[] = {"sigma=1e-3", "preset=pixel", "sigma=1e-2"};
     static const char* const unknown[] = {"vertices", "vertexes"};
     options.gradients = unknown;
     REFUSED(dpr_frame_render(&options, arrays, 4, &frame), "\"vertexes\"");
-    options.settings = twice, options.setting_count = 3;
-    REFUSED(dpr_frame_check(&options), "sigma");
   }
 }
 
