@@ -22,7 +22,7 @@ bool is_written(const CLI::Option& option) {
 bool are_one_file(const std::filesystem::path& a, const std::filesystem::path& b) {
   std::error_code error;
   if (exists(a, error) && exists(b, error)) return is_regular_file(a, error) && equivalent(a, b, error);
-  return weakly_canonical(absolute(a), error) == weakly_canonical(absolute(b), error);
+  return weakly_canonical(absolute(a, error), error) == weakly_canonical(absolute(b, error), error);
 }
 
 void require_files_apart(const CLI::App& command) {
