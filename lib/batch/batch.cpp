@@ -145,10 +145,7 @@ GradientRequest request_of(std::span<const std::string> names, bool with_affine_
 
 Batch::Batch(std::shared_ptr<RendererPool> pool, NamedArrays arrays, const BatchOptions& options)
     : frame_(std::move(pool), make_topology(arrays, options.settings)), wanted_(options.gradients) {
-  for (const std::string& name : wanted_) {
-    if (!find(arrays, name) && std::ranges::find(setting_names(), name) == setting_names().end())
-      throw InvalidArgument("gradients (batch)", '"' + name + '"', "names of given arrays and of settings");
-  }
+  require_numbers_of(wanted_, arrays);
   const RenderSettings settings = with_numbers(options.settings, arrays);
   const std::vector<View> views = make_views(arrays, settings);
   const std::vector<Lights> lights = make_lights(arrays, options, views.size());

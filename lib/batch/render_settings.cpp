@@ -186,6 +186,15 @@ void set_from_text(RenderSettings& settings, const std::string& text) {
   }
 }
 
+void require_numbers_of(std::span<const std::string> gradients, NamedArrays arrays) {
+  for (const std::string& name : gradients) {
+    if (find(arrays, name)) continue;
+    const std::vector<std::string_view> settings = setting_names();
+    if (std::ranges::find(settings, name) == settings.end())
+      throw InvalidArgument("gradients (batch)", '"' + name + '"', "names of given arrays and of settings");
+  }
+}
+
 RenderSettings settings_from_texts(std::int64_t width, std::int64_t height,
                                    const std::vector<std::string>& texts) {
   RenderSettings settings(width, height);

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "batch/named_arrays.hpp"
 #include "dpr/camera.hpp"
 #include "dpr/scene.hpp"
 #include "dpr/smoothing_options.hpp"
@@ -65,6 +67,8 @@ class RenderSettings {
 /// The keys of a scene's "smoothing"; "znear", "zfar" and "cull"; "shading" and "shininess" of lights; "wrap"
 /// and "filter" of textures; "layers" of samples.
 std::vector<std::string_view> setting_names();
+/// Throws InvalidArgument for gradients that are wanted of what is neither among the arrays nor a setting.
+void require_numbers_of(std::span<const std::string> gradients, NamedArrays arrays);
 
 /// Sets by "sigma=1e-3": a whole number, a number, or else a word.
 void set_from_text(RenderSettings& settings, const std::string& text);
