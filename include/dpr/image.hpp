@@ -3,10 +3,8 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <string>
 #include <vector>
 
-#include "dpr/error.hpp"
 #include "dpr/export.h"
 #include "dpr/vectors.hpp"
 
@@ -19,20 +17,16 @@ struct Image {
   std::vector<vec4> pixels;  ///< [height * width], row-major
 
   Image() = default;
-  /// Throws InvalidArgument for negative sides.
+  /// Of sides of 0 or more.
   Image(int width_, int height_, vec4 fill = vec4(0))
-      : width(width_), height(height_), pixels(count(width_, height_), fill) {}
+      : width(width_),
+        height(height_),
+        pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), fill) {}
 
   vec4& at(int column, int row) { return pixels[index(column, row)]; }
   const vec4& at(int column, int row) const { return pixels[index(column, row)]; }
 
  private:
-  static std::size_t count(int width, int height) {
-    if (width < 0 || height < 0)
-      throw InvalidArgument("size (Image)", std::to_string(width) + "x" + std::to_string(height),
-                            "sides of 0 or more");
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  }
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column);
   }
