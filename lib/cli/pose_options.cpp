@@ -33,8 +33,7 @@ void add_least_squares_options(CLI::App& command, const char* group, LeastSquare
       .add_flag(
           "--unknown-background", method.unknown_background,
           "Anything may lie behind the object, as in a photograph: nothing is compared with the scene's "
-          "background. With --box, colours that are seen beside the box alone count as the background's. "
-          "Implies "
+          "background. With --box, colours that are seen beside the box alone are the background's. Implies "
           "--robust")
       ->group(group);
   add("--light", options.light,

@@ -21,7 +21,10 @@ class Decoder {
   explicit Decoder(std::span<const unsigned char> content) : left_(content) {
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, fail, [](png_structp, png_const_charp) {});
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
-    if (info_ == nullptr) throw std::bad_alloc();
+    if (info_ == nullptr) {
+      png_destroy_read_struct(&png_, nullptr, nullptr);
+      throw std::bad_alloc();
+    }
     png_set_read_fn(png_, this, take);
   }
   ~Decoder() { png_destroy_read_struct(&png_, &info_, nullptr); }

@@ -244,6 +244,7 @@ std::vector<float> Combinations::pull_back(std::span<const float> gradient, std:
   require_at_least((of.empty() ? old_count : of.size()) * channels, gradient.size(), "gradient");
   if (of.empty())
     return {gradient.begin(), gradient.begin() + static_cast<std::ptrdiff_t>(old_count * channels)};
+  require_at_least(of.size(), weights.size(), "weights");
   std::vector<double> sums(old_count * channels, 0.0);
   for (std::size_t i = 0; i < of.size(); ++i) {
     for (int k = 0; k < 3; ++k) {

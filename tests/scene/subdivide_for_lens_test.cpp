@@ -393,6 +393,8 @@ TEST_SUITE("unit") {
     without_weights.of = {glm::uvec3(0)};
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, without_weights.combine(std::vector<float>(1), 1),
                           "weights (subdivided mesh): got 0");
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, without_weights.pull_back(std::vector<float>(1), 1, 1),
+                          "weights (subdivided mesh): got 0");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, pull_back({}, cut, {}), "meshes (subdivided scene)");
     AuxiliaryOutputs outputs;
     outputs.face_id = {1 << 20};

@@ -18,8 +18,8 @@ import tempfile
 import numpy as np
 from PIL import Image
 
-from uncertainty import turn
 from foreign import angle_degrees
+from uncertainty import turn
 
 TO_OPENGL = np.diag([1.0, -1, -1, 1])
 COLORS = {"triangle": [0.25, 0.6, 0.05], "schauma": [0.8, 0.3, 0.02]}
@@ -102,7 +102,7 @@ def bottle(arguments, folder):
     Image.fromarray(picture[y - 40:y + height + 40, x - 60:x + width + 60]).resize((3 * (width + 120), 3 * (height + 80)),
                                                                                   Image.NEAREST).save(arguments.overlay)
 
-    # Points of the depth image that the found bottle covers, in the body's axes, against the mesh's nearest vertices.
+    # Points of the depth image where the picture shows the bottle, in the world's axes, against the mesh's nearest vertices.
     depth = np.array(Image.open(arguments.folder / arguments.depth)) * 0.001
     rows, columns = np.nonzero((depth > 0.2) & (depth < 0.6))
     z, k = depth[rows, columns], depth_camera.intrinsics
