@@ -219,7 +219,7 @@ TEST_SUITE("robustness") {
     CAPTURE(whole.err);
     REQUIRE(whole.status == 0);
     // The second of them, or the first, which renders the report's pictures too.
-    for (const char* const order : {"DPR_LOST_QUEUE=2:100", "DPR_LOST_QUEUE=1:100"}) {
+    for (const char* const order : {"DPR_LOST_QUEUE=2:40", "DPR_LOST_QUEUE=1:40"}) {
       CAPTURE(order);
       const Outcome lost = fit_on_parts(folder, "lost.obj", order);
       CAPTURE(lost.err);
