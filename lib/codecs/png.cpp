@@ -32,12 +32,8 @@ class Decoder {
   Decoder& operator=(const Decoder&) = delete;
 
   /// Reads what comes before the pixels, which are 8 or 16 bits a channel, of grey or RGB, from here on.
-  void start() {
-    if (!has_started()) throw std::runtime_error("cannot be read: " + std::string(reason_.data()));
-  }
-  void read(std::vector<png_bytep>& rows) {
-    if (!has_read(rows.data())) throw std::runtime_error("cannot be read: " + std::string(reason_.data()));
-  }
+  void start() { require(has_started()); }
+  void read(std::vector<png_bytep>& rows) { require(has_read(rows.data())); }
 
   std::size_t width() const { return png_get_image_width(png_, info_); }
   std::size_t height() const { return png_get_image_height(png_, info_); }
@@ -46,6 +42,10 @@ class Decoder {
   bool has_exif() const { return png_get_valid(png_, info_, PNG_INFO_eXIf) != 0; }
 
  private:
+  void require(bool is_done) const {
+    if (!is_done) throw std::runtime_error("cannot be read: " + std::string(reason_.data()));
+  }
+
   [[noreturn]] static void fail(png_structp png, png_const_charp reason) {
     std::array<char, 256>& kept = static_cast<Decoder*>(png_get_error_ptr(png))->reason_;
     std::strncpy(kept.data(), reason, kept.size() - 1);

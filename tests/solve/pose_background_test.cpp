@@ -9,6 +9,7 @@
 
 #include "dpr/pose_tracker.hpp"
 #include "solve/pose_level.hpp"
+#include "solve/pose_window.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"
@@ -85,20 +86,6 @@ dpr::LeastSquares before_anything(dpr::PoseLight light) {
   return method;
 }
 
-/// About what an image shows.
-dpr::PoseBox box_of(const dpr::Image& image) {
-  glm::ivec2 low(image.width, image.height), high(0);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < image.width; ++x) {
-      if (image.at(x, y).w < 0.5F) continue;
-      low = glm::min(low, glm::ivec2(x, y));
-      high = glm::max(high, glm::ivec2(x + 1, y + 1));
-    }
-  }
-  const glm::vec2 corner(low), size(high - low);
-  return {corner.x, corner.y, size.x, size.y};
-}
-
 const dpr::Pose k_truth{dpr::rotation_from_vector({0.3, 0.6, 0.1}), {0.2, -0.1, 0.3}};
 
 /// So far from the truth.
@@ -153,8 +140,9 @@ TEST_SUITE("pipeline") {
     const dpr::Image target = photograph(device, lit, k_truth);
     dpr::LeastSquares method = before_anything(dpr::PoseLight::harmonics);
     method.rotations = 0;
-    const dpr::Image alone = dpr::test::rigid_image(device, placed(lit, k_truth));
-    method.box = box_of(alone);
+    dpr::Image coverage = dpr::test::rigid_image(device, placed(lit, k_truth));
+    for (glm::vec4& pixel : coverage.pixels) pixel.x = pixel.w;
+    method.box = dpr::extent(coverage);
     const dpr::PoseOptions options{.method = method, .solve_translation = true};
     const dpr::Pose start = moved(0.1, {0, 0.05, 0.4});
     const dpr::PoseResult found = dpr::PoseSolver(device, scene, target, options).solve(start);

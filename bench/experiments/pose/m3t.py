@@ -91,9 +91,10 @@ def bottle(arguments, folder):
     start[:3, 3] = 0, 0, 0.45
     pose, said = find(arguments, folder, "schauma", start, ["--search"])
     camera, depth_camera = (Camera(arguments.folder / f"sequence_{kind}_camera.yaml") for kind in ("color", "depth"))
-    (folder / "found.json").write_text(json.dumps(scene_of(arguments.folder, camera, "schauma", pose)))
-    subprocess.run([arguments.dpr, "render", "--scene", folder / "found.json", "--preset", "rigid", "--aov", "face_id",
-                    "-o", folder / "found.png", "--quiet"], check=True)
+    scene = scene_of(arguments.folder, camera, "schauma", pose)
+    (folder / "found.json").write_text(json.dumps(scene))
+    subprocess.run([arguments.dpr, "render", "--scene", folder / "found.json", "--preset", "rigid", "-o", folder / "found.png",
+                    "--quiet"], check=True)
     shown = np.array(Image.open(folder / "found.png"))[..., :3].max(-1) > 0
     edge = shown ^ (np.roll(shown, 1, 0) & np.roll(shown, 1, 1) & np.roll(shown, -1, 0) & np.roll(shown, -1, 1) & shown)
     picture = np.array(Image.open(arguments.folder / arguments.picture).convert("RGB"))
@@ -113,7 +114,6 @@ def bottle(arguments, folder):
     v = (seen[:, 1] / seen[:, 2] * k["fy"] + k["cy"]).astype(int)
     inside = (u > 0) & (u < camera.width) & (v > 0) & (v < camera.height)
     on_bottle = seen[inside][shown[v[inside], u[inside]]]
-    scene = json.loads((folder / "found.json").read_text())
     vertices = np.array(scene["meshes"][0]["positions"]) @ pose[:3, :3].T + pose[:3, 3]
     front = vertices[np.argsort(vertices[:, 2])[:len(vertices) // 2]]
     sample = on_bottle[np.random.default_rng(0).choice(len(on_bottle), 500), :3]
