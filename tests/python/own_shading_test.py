@@ -343,6 +343,10 @@ class OwnShadingTest(unittest.TestCase):
                     spread[:, samples.mask] = moved
                     np.testing.assert_array_equal(*(samples.resolve_with_jvp(*given)[1]
                                                     for given in ((rows, moved), (values, spread))))
+        faces, table = np.tile(FACES, (64, 1)), random(144, 6, seed=3)  # which the library gets packed, in memory of their own
+        many = RENDERER.rasterize(np.resize(TETRAHEDRON, (144, 3)), faces, self.views, self.intrinsics)
+        for given in ((table[:, :2],), (table[:, ::3], faces), (table[:, ::3], faces[:, ::-1])):
+            np.testing.assert_array_equal(many.interpolate(*given, covered=True), many.interpolate(*given)[many.mask])
         with self.assertRaisesRegex(ValueError, rf"values .*got \[{len(rows) - 1}, 3\], .*or \[{len(rows)}, C\]"):
             samples.resolve(rows[1:])
         with self.assertRaisesRegex(ValueError, r"tangents of values .*got \[2, 54, 3\], expected \[K, 55, 3\]"):

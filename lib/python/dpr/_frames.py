@@ -65,8 +65,9 @@ def options_of(spec, settings=(), first_view=0, gradients=(), defers_image=False
 
 
 def c_arrays(named):
-    """(name, packed array) pairs as (dpr_array[], count)."""
+    """(name, packed array) pairs as (dpr_array[], count), which keep the arrays alive."""
     slots = (_library.Array * len(named))()
+    slots.arrays = [array for _, array in named]
     for slot, (name, array) in zip(slots, named):
         slot.name, slot.data, slot.element = name.encode(), array.ctypes.data, _ELEMENTS[array.dtype]
         slot.dimensions = array.ndim

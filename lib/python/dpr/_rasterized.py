@@ -162,7 +162,7 @@ class Rasterized:
         return images
 
     def _moving(self, count, given):
-        """The frame's arrays of tangents, to keep while the library reads them."""
+        """The frame's arrays of tangents."""
         return self._lot.tangents({leaf: np.ascontiguousarray(tangent, np.float32) for leaf, tangent in given.items()}, count)
 
 
@@ -257,7 +257,7 @@ def _at_samples(samples, attributes, faces):
 
 def interpolated_at(samples, attributes, faces, outputs):
     """{name: array} of "values" and "steps". samples: {name: array}, as dpr_interpolate() takes them."""
-    named = _at_samples(samples, attributes, faces)  # which the library reads
+    named = _at_samples(samples, attributes, faces)
     size, channels = next(iter(samples.values())).shape[:3], attributes.shape[-1]
     found = {name: np.empty((*size, channels * (2 if name == "steps" else 1)), np.float32) for name in outputs}
     _library.call("dpr_interpolate", *_frames.c_arrays(named), *_frames.c_arrays(list(found.items())))
