@@ -240,6 +240,14 @@ class NvdiffrastTest(tensors.TestCase):
         moved = pos + torch.tensor([0.5, 0, 0, 0])
         other, _ = dr.rasterize(CONTEXT, moved, tri, [H, W])
         self.assertTrue(torch.equal(dr.antialias(mask, rast, moved, tri), dr.antialias(mask, other, moved, tri)))
+        more = torch.cat([pos, torch.tensor([[[0.6, 0.9, 0.1, 1.0]]])], 1)
+        rast, _ = dr.rasterize(CONTEXT, more, tri, [H, W])
+        before = dr.antialias(mask, rast, more, tri)
+        tri[0, 2] = 3  # in place
+        other, _ = dr.rasterize(CONTEXT, more, tri, [H, W])
+        found = dr.antialias(mask, rast, more, tri)
+        self.assertTrue(torch.equal(found, dr.antialias(mask, other, more, tri)))
+        self.assertFalse(torch.equal(found, before))
 
     def test_antialias_leaves_out_what_lies_beside_the_image(self):
         right = 2 * (W - 0.2) / W - 1  # beyond the centres of the last column

@@ -189,6 +189,7 @@ class Frames:
     for empty ranges. layers: as many surfaces as the layer's number, from 1 on."""
 
     def __init__(self, device, pos, tri, ranges, size, call, layers=1):
+        tri = tri.clone()  # which may change in place
         self.device, self.tri, self.ranges, self.layers, self._size = device, tri, ranges, layers, size
         if ranges is None:
             frame = _Frame(device, pos, tri, torch.zeros(len(pos), dtype=torch.long), size, call, layers)
@@ -231,8 +232,8 @@ class Frames:
         return self._in_order([rast for rast, _ in found], empty), self._in_order([db for _, db in found], empty)
 
     def vertices_of(self, pos, tri):
-        """Each part's vertices; None if any belongs to other positions."""
-        if tri is not self.tri and not torch.equal(tri.long(), self.tri.long()):
+        """Each part's vertices; None if any belongs to other positions, or triangles."""
+        if not torch.equal(tri.to(self.tri.dtype), self.tri):
             return None
         if (pos.ndim == 2) != (self.ranges is not None):
             return None
