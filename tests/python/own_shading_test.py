@@ -55,6 +55,19 @@ class OwnShadingTest(unittest.TestCase):
         corners = samples.interpolate(COLORS[FACES].reshape(-1, 3), np.arange(12).reshape(4, 3))
         self.assertTrue((corners == samples.interpolate(COLORS)).all())
 
+    def test_samples_are_of_what_was_rasterized(self):
+        """Also where arrays change in place afterwards."""
+        for of in (np.array, torch.tensor) if torch else (np.array,):
+            for meshes in (of, lambda array: [of(array)]):
+                vertices, faces = meshes(TETRAHEDRON), meshes(FACES)
+                wanted = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+                wanted = [wanted.interpolate(meshes(COLORS), covered=covered) for covered in (True, False)]
+                samples = RENDERER.rasterize(vertices, faces, self.views, self.intrinsics)
+                for array, changed in ((vertices, of(TETRAHEDRON)[[3, 1, 2, 0]]), (faces, of(FACES)[[1, 0, 3, 2]])):
+                    (array[0] if isinstance(array, list) else array)[:] = changed
+                for covered, values in zip((True, False), wanted):
+                    np.testing.assert_array_equal(samples.interpolate(meshes(COLORS), covered=covered), values)
+
     def test_images_and_gradients_are_the_librarys(self):
         for vertices in (TETRAHEDRON, np.stack([TETRAHEDRON, 0.8 * TETRAHEDRON])):
             arguments = {"colors": COLORS, "background": BACKGROUND, "wrt": ["vertices", "views", "intrinsics"]}

@@ -179,6 +179,14 @@ def to_numpy(array):
     return np.from_dlpack(array, device="cpu", copy=True)
 
 
+def copied(array):
+    """The same numbers in memory of their own; JAX's never change."""
+    kind = module_of(array)
+    if kind == "torch":
+        return array.clone()
+    return array if kind == "jax" else like(array, to_numpy(array).copy())
+
+
 def restored(array, gradient):
     """The gradient of an array from that of what it was converted to, and repeated in the first dimension, which it may
     be without."""

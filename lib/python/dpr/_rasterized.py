@@ -230,11 +230,9 @@ def shapes_of_values(size, covered):
 
 
 def _table(attributes, faces):
-    """Arrays of attributes [V, C] or [N, V, C], and faces or None, as the library takes them."""
-    if attributes.ndim == 3 and len(attributes) == 1:
-        attributes = attributes[0]
+    """Attributes [V, C] or [N, V, C], and faces [F, 3] or [N, F, 3] or None, as the library takes them."""
     arrays = [("attributes", attributes)] + ([] if faces is None else [("faces", faces.clip(0))])
-    return [(name, np.ascontiguousarray(array)) for name, array in arrays]
+    return [(name, np.ascontiguousarray(array[0] if array.ndim == 3 and len(array) == 1 else array)) for name, array in arrays]
 
 
 def _checked(name, array, shape, is_empty=False):
@@ -248,11 +246,8 @@ def _checked(name, array, shape, is_empty=False):
 
 
 def _at_samples(samples, attributes, faces):
-    """Attributes [V, C] or [N, V, C] and what they are interpolated by, as the library has them. samples: {name: array}"""
-    if attributes.ndim == 3 and len(attributes) == 1:
-        attributes = attributes[0]
-    arrays = {**samples, "attributes": attributes, "faces": faces.clip(0)}
-    return [(name, np.ascontiguousarray(array)) for name, array in arrays.items()]
+    """A table and what is interpolated by it, as the library has them. samples: {name: array}"""
+    return [(name, np.ascontiguousarray(array)) for name, array in samples.items()] + _table(attributes, faces)
 
 
 def interpolated_at(samples, attributes, faces, outputs):

@@ -355,8 +355,11 @@ def colors_of_parts(parts, faces):
 
 
 def rasterize(spec, plan, copy):
-    """Samples of a call's meshes."""
+    """Samples of a call's meshes, of whose faces they have their own: those that are given may change in place."""
     leaves, tensors = plan.leaves, None
+    for number, (path, leaf) in enumerate(zip(plan.paths, leaves)):
+        if path[0] == "faces":
+            leaves[number] = _arrays.copied(leaf)
     kinds = {_arrays.module_of(leaf) for leaf in leaves}
     kind = next((name for name in ("torch", "jax") if name in kinds), _arrays.module_of(plan.given[0]))
     if kind == "torch":
