@@ -218,6 +218,14 @@ class JaxTest(unittest.TestCase):
             change = (term(SQUARE + 1e-3 * step) - term(SQUARE - 1e-3 * step)) / 2e-3
             np.testing.assert_allclose((gradient * step).sum(), change, rtol=1e-2, atol=1e-3)
 
+    def test_two_faces_without_area_at_one_edge(self):
+        """Have no part in the gradients, which are those of the other faces alone."""
+        vertices = jnp.asarray([[0, 0, 0], [0, 0, 0], [1, 0, 0], [-1, 1, 0], [0, 2, 0], [2, 2, 1]], float)
+        losses, alone = dpr.MeshLoss([[0, 1, 2], [1, 0, 3], [3, 2, 4], [4, 2, 5]]), dpr.MeshLoss([[3, 2, 4], [4, 2, 5]])
+        for name in ("normal_consistency", "flatness"):
+            found, wanted = (jax.grad(getattr(loss, name))(vertices) for loss in (losses, alone))
+            np.testing.assert_allclose(len(losses._hinges) * found, wanted, rtol=1e-5, atol=1e-6)
+
     def test_losses_of_images(self):
         """Of arrays, lists and NumPy's arrays alike, and traced by jit."""
         image, target = (random(1, 14, 15, 4, seed=seed) for seed in (1, 2))

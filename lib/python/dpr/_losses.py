@@ -115,7 +115,7 @@ class MeshLoss:
         a = _cross(edge, vertices[..., self._across[:, 0], :] - start)
         b = _cross(vertices[..., self._across[:, 1], :] - start, edge)
         has_area = ((a * a).sum(-1) > _LEAST) & ((b * b).sum(-1) > _LEAST)
-        bend = (1 - (a * b).sum(-1) / (_length(a) * _length(b))) * has_area
+        bend = (1 - (a / _length(a)[..., None] * (b / _length(b)[..., None])).sum(-1)) * has_area
         return _mean(term(bend))
 
     def _require(self, vertices):
