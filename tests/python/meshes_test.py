@@ -165,6 +165,11 @@ class LossesTest(unittest.TestCase):
         squares = ((a[:, None] - b) ** 2).sum(-1)
         self.assertAlmostEqual(float(dpr.chamfer(a, b)), squares.min(1).mean() + squares.min(0).mean(), 6)
         self.assertAlmostEqual(float(dpr.chamfer(a.tolist(), b)), float(dpr.chamfer(a, b)), 6)
+        away = np.float64([300, 0, -500])  # where sums of float32 have few digits for distances
+        self.assertAlmostEqual(float(dpr.chamfer(a + away, b + away)) / float(dpr.chamfer(a, b)), 1, 6)
+        shifted = [(points + away).astype(np.float32) for points in (a, b)]
+        squares = ((shifted[0][:, None] - shifted[1]) ** 2).sum(-1)
+        self.assertAlmostEqual(float(dpr.chamfer(*shifted)) / (squares.min(1).mean() + squares.min(0).mean()), 1, 6)
         for others, error in ((b[:, :2], ValueError), (b[:0], ValueError), ("b", TypeError)):
             with self.assertRaisesRegex(error, "others"):
                 dpr.chamfer(a, others)

@@ -130,7 +130,7 @@ def _constant(array):
     if _arrays.module_of(array) == "jax":
         jax = sys.modules["jax"]
         return jax.numpy, jax.lax.stop_gradient(array)
-    return np, np.asarray(_arrays.to_numpy(array), np.float32)
+    return np, _arrays.to_numpy(array)
 
 
 def sample_points(vertices: Array, faces: Array, count: int, seed: Optional[int] = None) -> Array:
@@ -172,6 +172,8 @@ def chamfer(points: Array, others: Array) -> Array:
     if lib is not other_lib:
         lib = lib if lib is not np else other_lib
         points, others = lib.asarray(points), lib.asarray(others)  # NumPy's take no indices that JAX traces
+    middle = (other_values.min(0) + other_values.max(0)) / 2  # far from the origin squares have too few digits
+    values, other_values = (lib.asarray(own - middle, np.float32) for own in (values, other_values))
     there = points - others[_nearest(lib, values, other_values)]
     back = others - points[_nearest(lib, other_values, values)]
     return (there * there).sum(-1).mean() + (back * back).sum(-1).mean()
