@@ -101,6 +101,10 @@ class ImageLossTest(unittest.TestCase):
                     for sign in (-1, 1)]
             expected = float(ends[1] - ends[0]) / (2 * step)
             self.assertAlmostEqual(float((gradient * direction).sum()), expected, delta=2e-3 * max(abs(expected), 0.05))
+            swapped = dpr.image_loss(target.numpy(), image, mask=mask, **{kind: 1})
+            if kind != "silhouette":
+                self.assertAlmostEqual(float(swapped.detach()), float(loss.detach()), 5)
+            self.assertGreater(float(torch.autograd.grad(swapped, image)[0].abs().max()), 0)
         empty = torch.zeros(1, 12, 13, 4, requires_grad=True)
         dpr.image_loss(empty, torch.zeros_like(empty), **dict.fromkeys(KINDS, 1)).backward()
         self.assertTrue(empty.grad.isfinite().all())

@@ -237,6 +237,8 @@ class JaxTest(unittest.TestCase):
             gradient = jax.jit(jax.grad(loss))(jnp.asarray(image))
             change = (loss(image + 1e-2 * step) - loss(image - 1e-2 * step)) / 2e-2
             np.testing.assert_allclose((gradient * step).sum(), change, rtol=2e-2, atol=1e-4)
+        np.testing.assert_allclose(dpr.image_loss(image, jnp.asarray(target), mse=1), dpr.image_loss(image, target, mse=1),
+                                   rtol=1e-5)
 
     def test_wrong_arguments(self):
         views, intrinsics = cameras(1)

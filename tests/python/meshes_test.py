@@ -176,6 +176,9 @@ class LossesTest(unittest.TestCase):
         if torch:
             points = torch.from_numpy(a[:9]).double().requires_grad_()
             self.assertTrue(torch.autograd.gradcheck(lambda x: dpr.chamfer(x, torch.from_numpy(b[:7]).double()), points))
+            wanted, = torch.autograd.grad(dpr.chamfer(points, torch.from_numpy(b[:7]).double()), points)
+            for pair in ((points, b[:7]), (b[:7], points)):  # beside NumPy's arrays
+                np.testing.assert_allclose(torch.autograd.grad(dpr.chamfer(*pair), points)[0], wanted, rtol=1e-6)
 
     @unittest.skipUnless(torch, "no PyTorch")
     def test_deforms_a_sphere(self):

@@ -5,7 +5,7 @@ from typing import Any, Optional
 import numpy as np
 
 from . import _arrays
-from ._losses import _like
+from ._losses import alike
 
 Array = Any
 _WHERE = "dpr.image_loss"
@@ -81,10 +81,7 @@ def _of_level(image, target, mask, weights, robust_scale):
     return total
 
 
-def _images(name, value, of=None):
-    array = _arrays.converted(name, _arrays.from_numbers(value), where=_WHERE)
-    if of is not None and _arrays.module_of(array) != _arrays.module_of(of):
-        array = _like(of, _arrays.to_numpy(array))
+def _images(name, array, of=None):
     shape = list(array.shape)
     is_right = len(shape) in (3, 4) and (shape[-1] == 1 if name == "mask" else shape[-1] in (3, 4)) and all(shape)
     if is_right and of is not None:
@@ -124,11 +121,14 @@ def image_loss(image: Array, target: Array, *, mse: float = 0, l1: float = 0, si
         _arrays.fail(ValueError, "robust_scale", robust_scale, "a colour difference, at least 1e-6", _WHERE)
     if levels not in range(1, 17):
         _arrays.fail(ValueError, "levels", levels, "1 to 16", _WHERE)
-    image = _images("image", image)
-    target = _images("target", target, image)
+    given = {name: _arrays.converted(name, _arrays.from_numbers(array), where=_WHERE)
+             for name, array in (("image", image), ("target", target), ("mask", mask)) if array is not None or name != "mask"}
+    given = dict(zip(given, alike(given, _WHERE)))
+    image = _images("image", given["image"])
+    target = _images("target", given["target"], image)
     if silhouette and not image.shape[-1] == target.shape[-1] == 4:
         _arrays.fail(ValueError, "silhouette", "images without alpha", "RGBA", _WHERE)
-    mask = image[..., :1] * 0 + 1 if mask is None else _images("mask", mask, image)
+    mask = image[..., :1] * 0 + 1 if mask is None else _images("mask", given["mask"], image)
     total = 0
     for level in range(levels):
         if level:

@@ -25,6 +25,21 @@ def _like(array, values):
     return sys.modules["torch"].as_tensor(values).to(array) if _arrays.module_of(array) == "torch" else values
 
 
+def alike(named, where):
+    """Arrays, by name, that go together: tensors, or arrays of JAX and NumPy, by the first that is a tensor or JAX's. Fails
+    for a tensor whose gradient would be lost."""
+    home = next((array for array in named.values() if _arrays.module_of(array) in ("torch", "jax")), None)
+    kind, found = _arrays.module_of(home), []
+    for name, array in named.items():
+        if home is not None and _arrays.module_of(array) not in (kind, "numpy"):
+            if getattr(array, "requires_grad", False):
+                _arrays.fail(ValueError, name, "a tensor that requires a gradient", "one without beside JAX's arrays", where)
+            array = _arrays.to_numpy(array)
+        is_moved = kind == "torch" and _arrays.module_of(array) == "numpy"
+        found.append(sys.modules["torch"].as_tensor(array).to(home) if is_moved else array)
+    return found
+
+
 def _cross(a, b):
     """The arrays' libraries have it by different names."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
@@ -168,6 +183,7 @@ def chamfer(points: Array, others: Array) -> Array:
         _arrays.require_array(name, array, "dpr.chamfer")
         if len(array.shape) != 2 or array.shape[-1] != 3 or not array.shape[0]:
             _arrays.fail(ValueError, name, list(array.shape), "[N, 3], N at least 1", "dpr.chamfer")
+    points, others = alike({"points": points, "others": others}, "dpr.chamfer")
     (lib, values), (other_lib, other_values) = _constant(points), _constant(others)
     if lib is not other_lib:
         lib = lib if lib is not np else other_lib
