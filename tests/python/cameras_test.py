@@ -192,6 +192,11 @@ class CamerasTest(unittest.TestCase):
                  torch.tensor(40.0, dtype=torch.float64, requires_grad=True)]
         self.assertEqual(dpr.look_at(given[0]).dtype, torch.float64)
         self.assertTrue(torch.autograd.gradcheck(loss, given, eps=1e-2, atol=0.2, rtol=2e-2))
+        if hasattr(torch, "func"):
+            eye = given[0].detach()
+            for jacobian in (torch.func.jacrev, torch.func.jacfwd):
+                found = jacobian(dpr.look_at)(eye)[0, 0]
+                np.testing.assert_allclose(found, torch.autograd.functional.jacobian(dpr.look_at, eye)[0, 0], atol=1e-12)
         R, K = torch.tensor(rotation(3), requires_grad=True), torch.eye(3, dtype=torch.float64)
         for views, intrinsics in (cameras.from_opencv(R, [0, 0, 4], 30 * K), cameras.from_softras(given[0], 32),
                                   cameras.from_pytorch3d(R, [0, 0, 4], 32, 32, fov_degrees=given[1])):

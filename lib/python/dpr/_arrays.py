@@ -179,6 +179,18 @@ def to_numpy(array):
     return np.from_dlpack(array, device="cpu", copy=True)
 
 
+def known(array):
+    """NumPy array of its values; None while a compiler only traces what is done with them, and within torch.func."""
+    kind = module_of(array)
+    if kind == "jax" and isinstance(array, sys.modules["jax"].core.Tracer) or is_compiling():
+        return None
+    if kind == "torch":
+        is_wrapped = getattr(getattr(sys.modules["torch"]._C, "_functorch", None), "is_functorch_wrapped_tensor", None)
+        if is_wrapped is not None and is_wrapped(array):
+            return None
+    return to_numpy(array)
+
+
 def copied(array):
     """The same numbers in memory of their own; JAX's never change."""
     kind = module_of(array)

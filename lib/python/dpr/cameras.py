@@ -56,15 +56,6 @@ def _batch(name, array, *shape):
     return array
 
 
-def _known(array):
-    """NumPy array of its values; None while a compiler only traces what is done with them."""
-    if _arrays.module_of(array) == "jax" and isinstance(array, sys.modules["jax"].core.Tracer):
-        return None
-    if _arrays.is_compiling():
-        return None
-    return _arrays.to_numpy(array)
-
-
 def _columns(lib, *columns):
     """Arrays [N] or [N, ...] side by side, each also of N = 1."""
     broadcast = lib.broadcast_arrays if hasattr(lib, "broadcast_arrays") else lib.broadcast_tensors
@@ -84,7 +75,7 @@ def _cross(lib, a, b):
 
 def _unit(lib, vectors, name, least=0.0):
     lengths = lib.sqrt((vectors * vectors).sum(-1))
-    known = _known(lengths)
+    known = _arrays.known(lengths)
     if known is not None and not (known > least).all():
         _fail(name, "directions without length", "eye and target apart, and up not along the view")
     return vectors / lengths[:, None]
@@ -111,7 +102,7 @@ def perspective(fov_y_degrees: Array, width: int, height: int) -> Array:
     """Intrinsics [N, 4] of a field of view from the lower to the upper edge, a number or [N]; the axis is in the middle.
     Raises ValueError for an angle that is not between 0 and 180 degrees."""
     lib, (fov,) = _together(fov_y_degrees)
-    known = _known(fov)
+    known = _arrays.known(fov)
     if known is not None and not ((known > 0) & (known < 180)).all():
         _fail("fov_y_degrees", np.asarray(known).tolist(), "degrees, above 0 and below 180")
     return _intrinsics(lib, (height / 2) / lib.tan(_batch("fov_y_degrees", fov) * (np.pi / 360)), width, height)
@@ -131,7 +122,7 @@ def from_opengl(projection: Array, width: int, height: int) -> Array:
     which must not be off centre. znear and zfar are settings. Raises ValueError for another kind of matrix."""
     lib, (projection,) = _together(projection)
     matrix = _batch("projection", projection, 4, 4)
-    known = _known(matrix)
+    known = _arrays.known(matrix)
     is_orthographic = known is not None and bool((known[:, 3] == [0, 0, 0, 1]).all())
     if known is not None:
         _require_projection(known, is_orthographic, width, height)
@@ -169,7 +160,7 @@ def from_opencv(rotation: Array, translation: Array, matrix: Array, distortion: 
     rotation, matrix = _batch("rotation", rotation, 3, 3), _batch("matrix", matrix, 3, 3)
     if translation.ndim > 1 and translation.shape[-1] == 1:  # a column, as OpenCV has it
         translation = translation[..., 0]
-    translation, known = _batch("translation", translation, 3), _known(matrix)
+    translation, known = _batch("translation", translation, 3), _arrays.known(matrix)
     if known is not None and np.any(known[:, 0, 1]):
         _fail("matrix", f"a skew of {known[0, 0, 1]}", "0")
     signs = _together(rotation, [1, -1, -1])[1][1]
