@@ -130,9 +130,27 @@ class NumpyTest(TangentsTest):
         np.testing.assert_allclose(vector, jacobian.T @ (rows[:, 0] * residuals.reshape(-1)), rtol=1e-3)
         np.testing.assert_allclose(dpr.normal_equations(tangents, residuals)[0], jacobian.T @ jacobian, rtol=1e-4)
         np.testing.assert_allclose(dpr.normal_equations([[1, 2]], [3, 4])[1], [11])
+        np.testing.assert_allclose(dpr.normal_equations([[1, 2]], [3, 4], [0, 2])[1], [16])
+        np.testing.assert_allclose(dpr.normal_equations([[1, 2]], [3, 4], 2)[1], [22])
         for wrong, error in ((residuals[1:], ValueError), (None, TypeError)):
             with self.assertRaisesRegex(error, "tangents .*expected|residuals .*NoneType"):
                 dpr.normal_equations(tangents, wrong)
+        for wrong in (weights[None], np.ones((3, 1, 1, 1, 1)), weights[:, :3], -weights, weights * np.nan):
+            with self.assertRaisesRegex(ValueError, "weights .*got .*(broadcasts|at least 0)"):
+                dpr.normal_equations(tangents, residuals, wrong)
+
+    @unittest.skipUnless(torch, "no PyTorch")
+    def test_normal_equations_of_tensors_and_arrays(self):
+        given = random(3, 4, 5), random(4, 5, seed=2), random(5, seed=3)
+        wanted = dpr.normal_equations(*given)
+        for kinds in ((1, 1, 1), (0, 1, 0), (1, 0, 0), (0, 0, 1)):
+            for of in (torch.float32, torch.float64):
+                mixed = [torch.from_numpy(array).to(of) if kind else array for array, kind in zip(given, kinds)]
+                for found, expected in zip(dpr.normal_equations(*mixed), wanted):
+                    self.assertEqual(found.dtype, of)
+                    np.testing.assert_allclose(found, expected, rtol=1e-5)
+        found = dpr.normal_equations(*map(torch.from_numpy, given[:2]), given[2].tolist())
+        np.testing.assert_allclose(found[0], wanted[0], rtol=1e-5)
 
     def test_gauss_newton_finds_a_shift(self):
         views, intrinsics = cameras(1)
