@@ -144,6 +144,11 @@ class ArgumentsTest(unittest.TestCase):
             with self.assertRaisesRegex((ValueError, TypeError), "blur"):
                 dpr.Renderer(64, 48, **wrong)
 
+        for wrong in (np.array(-0.7), np.float32([0]), np.array(np.nan)):
+            for call in (dpr.render, dpr.render_with_vjp):
+                with self.assertRaisesRegex(ValueError, "blur .*got .*, expected a number of pixels above 0"):
+                    call(*MESH, *cameras(1), width=64, height=48, blur=wrong)
+
     def test_gradient_of_blur(self):
         renderer, views, step = dpr.Renderer(SIZE, SIZE, **{**SMOOTH, "sigma": None}), cameras(1), 1e-2
         weights = random(1, SIZE, SIZE, 4, seed=3)

@@ -414,6 +414,8 @@ class PackageTest(RenderTest):
             (ValueError, r"lights.point .* got \[\], expected \[L, 9\]", {"lights": {"point": torch.tensor(1.0)}}),
             (ValueError, "sigma", {"sigma": torch.ones(2)}),
             (RuntimeError, "sigma", {"sigma": -1.0}),
+            (ValueError, "blur .* got -0.5, expected a number of pixels above 0", {"blur": torch.tensor(-0.5).requires_grad_()}),
+            (TypeError, "device .* got 1.5, expected a name", {"device": 1.5}),
             (RuntimeError, "width", {"width": 0}),
             (RuntimeError, "preset", {"preset": "hard"}),
             (RuntimeError, "name .* got \"zfat\", .* did you mean 'zfar'", {"zfat": 3}),
@@ -428,6 +430,7 @@ class PackageTest(RenderTest):
         with self.assertRaises(NotImplementedError):  # of torch: there is nothing to copy
             dpr.render(**{**good, "vertices": TETRAHEDRON.to("meta"), "copy": True})
         self.assert_same(dpr.render(**good, copy=True), expected)
+        self.assert_same(dpr.render(**{**good, "device": 0}), dpr.render(**{**good, "device": "0"}))
 
     def test_no_call_depends_on_the_last_one(self):
         """A kept renderer's views, smoothing and lights need not go with those of the next call."""

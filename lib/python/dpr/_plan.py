@@ -12,6 +12,7 @@ from ._merged import require_padding
 
 _FLOATS = ("vertices", "colors", "face_colors", "opacities", "face_opacities", "texcoords")
 _INDICES = ("faces", "face_texcoords", "face_textures", "face_materials")
+_BLUR = "a number of pixels above 0"
 _EUCLIDEAN = ("opendr", "nmr")
 """Presets with distances in NDC, not squared."""
 
@@ -68,6 +69,12 @@ def pixels(name, value):
     return int(value)
 
 
+def device_name(device):
+    if not isinstance(device, (str, numbers.Integral)):
+        fail(TypeError, "device", repr(device), "a name, or a number of dpr.devices()")
+    return str(device)
+
+
 def require_names(given, known):
     """Fails for a keyword that there is not, and tells the nearest, or all where none is near."""
     for name in given:
@@ -87,9 +94,9 @@ def power_of_blur(renderer_settings, width, height):
 
 def sigma_of_blur(blur, scale, power):
     if not isinstance(blur, numbers.Real):
-        fail(TypeError, "blur", repr(blur), "a number of pixels")
+        fail(TypeError, "blur", repr(blur), _BLUR)
     if not 0 < blur < math.inf:
-        fail(_library.InvalidArgument, "blur", blur, "a number of pixels above 0")
+        fail(_library.InvalidArgument, "blur", blur, _BLUR)
     return (scale * blur) ** power
 
 
@@ -154,6 +161,9 @@ class Plan:
 
     def blur_to_sigma(self, number, scale, power):
         blur = self.leaves[number]
+        known = _arrays.known(blur)
+        if known is not None and not ((known > 0) & (known < math.inf)).all():
+            fail(_library.InvalidArgument, "blur", known.tolist(), _BLUR)
         if _arrays.module_of(blur) not in ("torch", "jax"):
             blur = _arrays.to_numpy(blur)
         sigma = (scale * blur) ** power

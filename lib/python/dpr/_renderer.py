@@ -46,7 +46,7 @@ class Renderer:
     only mesh.
     """
 
-    def __init__(self, width: int, height: int, *, device: str = "", **settings: Setting):
+    def __init__(self, width: int, height: int, *, device: Union[str, int] = "", **settings: Setting):
         self._configure({"width": width, "height": height, "device": device, **settings})
 
     def _configure(self, given):
@@ -57,7 +57,7 @@ class Renderer:
         if "sigma" in given and "blur" in given:
             _arrays.fail(ValueError, "blur", "blur and sigma", "one of them")
         width, height = (_plan.pixels(name, given.pop(name, None)) for name in ("width", "height"))
-        device, texts = given.pop("device", ""), []
+        device, texts = _plan.device_name(given.pop("device", "")), []
         has_blur = "sigma" in given or "blur" in given or given.get("preset") != "pixel"
         for name, value in (given if has_blur else {**given, "blur": _DEFAULT_BLUR}).items():
             if name == "blur":
@@ -328,7 +328,7 @@ def _split(arguments):
 
 
 def render(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
-           device: str = "", **arguments: Any) -> Any:
+           device: Union[str, int] = "", **arguments: Any) -> Any:
     """Renderer(width, height, device=device, ...) and its call in one, with the keywords of both.
 
     """
@@ -337,7 +337,7 @@ def render(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, 
 
 
 def render_with_jvp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
-                    tangents: Dict[str, Any], device: str = "", **arguments: Any) -> Tuple[Any, Array]:
+                    tangents: Dict[str, Any], device: Union[str, int] = "", **arguments: Any) -> Tuple[Any, Array]:
     """Renderer(width, height, device=device, ...) and its jvp() in one, with the keywords of both: see there."""
     settings, of_call = _split(arguments)
     return Renderer(width, height, device=device, **settings).jvp(vertices, faces, views, intrinsics, tangents=tangents,
@@ -345,7 +345,7 @@ def render_with_jvp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: A
 
 
 def render_with_vjp(vertices: Meshes, faces: Meshes, views: Array, intrinsics: Array, *, width: int, height: int,
-                    device: str = "", wrt: Optional[Iterable[str]] = None,
+                    device: Union[str, int] = "", wrt: Optional[Iterable[str]] = None,
                     **arguments: Any) -> Tuple[Any, Callable[..., Dict[str, Any]]]:
     """Renderer(width, height, device=device, ...) and its vjp() in one, with the keywords of both: see there."""
     settings, of_call = _split(arguments)
