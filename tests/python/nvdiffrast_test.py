@@ -211,6 +211,23 @@ class NvdiffrastTest(tensors.TestCase):
         found, derivatives = dr.interpolate(attr, rast, tri)
         self.assertEqual(derivatives.shape, (2, H, W, 0))
 
+    def test_other_default_types(self):
+        """Gradients do not depend on the type that tensors have by default."""
+        pos, tri, attr = clip(CUBE, turned(0.5, 0.4, 4)), torch.from_numpy(CUBE_FACES), random(8, 3)
+
+        def gradients():
+            leaf = pos.clone().requires_grad_()
+            rast, rast_db = dr.rasterize(CONTEXT, leaf, tri, [H, W])
+            color, derivatives = dr.interpolate(attr, rast, tri, rast_db, "all")
+            images = color, derivatives, dr.antialias(color, rast, leaf, tri)
+            return [torch.autograd.grad(image.square().sum(), leaf, retain_graph=True)[0] for image in images]
+
+        wanted = gradients()
+        self.addCleanup(torch.set_default_dtype, torch.get_default_dtype())
+        torch.set_default_dtype(torch.float64)
+        for found, expected in zip(gradients(), wanted):
+            self.assertTrue(torch.equal(found, expected))
+
     def test_antialias_covers_areas(self):
         pos = torch.tensor([[[-0.6, -0.7, 0.1, 1], [0.7, -0.5, 0.1, 1], [-0.1, 0.8, 0.1, 1]]])
         tri = torch.tensor([[0, 1, 2]])

@@ -56,10 +56,10 @@ class _Frame:
     def gradients(self, pos, rast, grad_rast, grad_db):
         """(gradient of pos, if it has one by itself, [those of the frame's tensors])"""
         raster, of_pos, shown = self._rasterized.raster, None, rast[..., 3] > 0  # others are constant
-        grad = torch.zeros(len(pos), raster.height, raster.width, 3)
+        grad = rast.new_zeros(len(pos), raster.height, raster.width, 3)
         inner = self._inner(grad)
         if self._camera.is_perspective and grad_db is None:
-            torch.where(shown[..., None], grad_rast[..., :2], torch.zeros(()), out=inner[..., :2])
+            torch.where(shown[..., None], grad_rast[..., :2], rast.new_zeros(()), out=inner[..., :2])
         else:
             covered = shown.reshape(-1).nonzero()[:, 0]
             of_pos, of_weights = self._gradients_at(pos, covered, grad_rast, grad_db)

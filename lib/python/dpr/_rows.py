@@ -16,7 +16,7 @@ class _Rows(torch.autograd.Function):
         index, = ctx.saved_tensors
         channels = grad.shape[1]
         places = (index[:, None] * channels + torch.arange(channels)).reshape(-1)
-        table = torch.zeros(ctx.count * channels).scatter_add_(0, places, grad.reshape(-1))
+        table = grad.new_zeros(ctx.count * channels).scatter_add_(0, places, grad.reshape(-1))
         return table.reshape(ctx.count, channels), None
 
 
