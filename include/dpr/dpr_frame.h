@@ -182,8 +182,8 @@ DPR_API dpr_status dpr_mesh_file_read(const char* path, dpr_mesh_file** file);
 /* Valid until the file is destroyed, and not to be written to. */
 DPR_API dpr_status dpr_mesh_file_contents(const dpr_mesh_file* file, dpr_mesh_contents* contents);
 DPR_API void dpr_mesh_file_destroy(dpr_mesh_file* file);
-/* Writes OBJ, PLY or GLB, by the extension: vertices [V, 3], faces, colors [V, 3] or face_colors [F, 3], and into GLB
- * texture coordinates and textures. */
+/* Writes OBJ, PLY or GLB, by the extension: vertices [V, 3], faces, colors [V, 3] or face_colors [F, 3], into OBJ and
+ * GLB texture coordinates, and into GLB textures. */
 DPR_API dpr_status dpr_mesh_file_write(const char* path, const dpr_array* arrays, size_t count,
                                        const char* const* settings, size_t setting_count);
 

@@ -249,6 +249,8 @@ std::vector<Lights> make_lights(NamedArrays arrays, const BatchOptions& options,
 Topology make_topology(NamedArrays arrays, const RenderSettings& settings) {
   const BatchSizes sizes = check_sizes(arrays);
   Surface surface = make_surface(arrays, settings, sizes.vertices);
+  if (surface.texcoords > 0 && surface.textures.empty())
+    throw InvalidArgument("textures (batch)", "none beside texcoords", "both or neither");
   return {require(arrays, "faces"), sizes.views_of_faces,
           sizes.vertices,           find(arrays, "face_colors") != nullptr,
           settings.width(),         settings.height(),

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/checks.hpp"
+#include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "batch/inputs.hpp"
 #include "c/handles.hpp"
@@ -186,9 +187,13 @@ dpr_status dpr_mesh_file_write(const char* path, const dpr_array* arrays, std::s
     const auto how =
         dpr::batch::settings_from_texts(1, 1, dpr::batch::to_words(settings, setting_count, "settings"));
     const dpr::Mesh mesh = dpr::batch::make_mesh(dpr::batch::to_arrays(arrays, count, "arrays"), how);
-    if (!mesh.textures.empty() && !to.ends_with(".glb"))
+    const std::string extension = dpr::lower_case_extension(to);
+    if (!mesh.textures.empty() && extension != ".glb")
       throw dpr::InvalidArgument("textures (dpr_mesh_file_write)", to,
                                  "a .glb file, which alone holds textures");
+    if (!mesh.texcoords.empty() && extension == ".ply")
+      throw dpr::InvalidArgument("texcoords (dpr_mesh_file_write)", to,
+                                 "an .obj or .glb file, which hold texture coordinates");
     dpr::write_mesh(to, mesh);
   });
 }

@@ -128,11 +128,8 @@ Surface make_surface(NamedArrays arrays, const RenderSettings& settings, std::si
   Surface surface;
   surface.textures = texture_forms(arrays, settings);
   take_texcoords(arrays, faces, vertices, surface);
-  const bool has_textures = !surface.textures.empty();
-  if (has_textures == (surface.texcoords == 0)) {
-    throw InvalidArgument(has_textures ? "texcoords (batch)" : "textures (batch)",
-                          has_textures ? "none beside textures" : "none beside texcoords", "both or neither");
-  }
+  if (!surface.textures.empty() && surface.texcoords == 0)
+    throw InvalidArgument("texcoords (batch)", "none beside textures", "both or neither");
   surface.materials = count_materials(arrays);
   surface.vertex_opacities = count_opacities(arrays, "opacities", sizes.views, vertices);
   surface.face_opacities = count_opacities(arrays, "face_opacities", sizes.views, sizes.count);

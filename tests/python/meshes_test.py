@@ -57,6 +57,21 @@ class FilesTest(unittest.TestCase):
             for key, values, error in (("vertices", vertices, 1e-6), ("colors", colors, 10.0**-places)):
                 np.testing.assert_allclose(found[key][found["faces"]], values[faces], atol=error)
 
+    def test_texture_coordinates_go_through_files(self):
+        """Those of vertices, of corners, and with indices, without textures."""
+        vertices, faces = octahedron()
+        of_corners = np.random.default_rng(1).random((len(faces), 3, 2), np.float32)
+        indices = np.arange(24)[::-1].reshape(-1, 3)
+        for given, wanted in (({"texcoords": vertices[:, :2]}, vertices[faces][..., :2]), ({"texcoords": of_corners}, of_corners),
+                              ({"texcoords": of_corners.reshape(-1, 2), "face_texcoords": indices},
+                               of_corners.reshape(-1, 2)[indices])):
+            dpr.write_mesh(self.folder / "mesh.obj", vertices, faces, **given)
+            found = dpr.read_mesh(self.folder / "mesh.obj")
+            np.testing.assert_array_equal(found["faces"], faces)
+            np.testing.assert_allclose(found["texcoords"][found["face_texcoords"]], wanted, atol=1e-6)
+            dpr.write_mesh(self.folder / "mesh.glb", vertices, faces, **given)
+            self.assertIn(b"TEXCOORD_0", (self.folder / "mesh.glb").read_bytes())
+
     def test_what_is_left_out_is_a_warning(self):
         (self.folder / "mesh.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n")
         with self.assertWarnsRegex(UserWarning, "none.mtl"):
@@ -103,7 +118,9 @@ class FilesTest(unittest.TestCase):
         for name, arguments, message in (("a.obj", texture, "textures"), ("a.stl", {}, "stl"),
                                          ("a.obj", {"colors": vertices[1:]}, "colors"), ("no/a.obj", {}, "no/a.obj"),
                                          ("a.glb", {**texture, "wrap": "round"}, "wrap"),
-                                         ("a.glb", {"textures": texture["textures"]}, "texcoords")):
+                                         ("a.glb", {"textures": texture["textures"]}, r"texcoords \(dpr.write_mesh\)"),
+                                         ("a.obj", {"texcoords": vertices[1:, :2]}, r"texcoords \(dpr.write_mesh\)"),
+                                         ("a.PLY", {"texcoords": vertices[:, :2]}, r"texcoords \(dpr.write_mesh\).*obj or .glb")):
             with self.subTest(name=name, message=message), self.assertRaisesRegex(dpr.Error, message):
                 dpr.write_mesh(self.folder / name, vertices, faces, **arguments)
         with self.assertRaisesRegex(ValueError, "faces"):

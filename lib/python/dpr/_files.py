@@ -60,6 +60,7 @@ def read_mesh(file: Union[str, "os.PathLike[str]"]) -> Dict[str, Any]:
     return mesh
 
 
+@_arrays.named("dpr.write_mesh")
 def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Array, *, colors: Optional[Array] = None,
                face_colors: Optional[Array] = None, opacities: Optional[Array] = None,
                face_opacities: Optional[Array] = None, texcoords: Optional[Array] = None,
@@ -69,7 +70,7 @@ def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Arr
     """Writes a mesh as OBJ, PLY or GLB, by the extension, whole or not at all.
 
     The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8 bits;
-    OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1] as texels are. GLB numbers vertices anew, in the order
+    texcoords go without them too, but not into PLY; OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1] as texels are. GLB numbers vertices anew, in the order
     of the faces, and has none that no face uses. Materials and opacities are left out, with a UserWarning. Raises OSError
     (dpr.IoError) where the file cannot be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
     """

@@ -175,7 +175,7 @@ def call(name, *arguments):
     status = getattr(library, name)(*arguments)
     if status:
         text = library.dpr_last_error().decode(errors="replace").replace("(batch)", "(dpr.render)")
-        text = text.replace("(attribute images)", "(outputs, dpr.render)")
+        text = text.replace("(attribute images)", "(outputs, dpr.render)").replace("(dpr_mesh_file_write)", "(dpr.write_mesh)")
         raise _ERRORS.get(status, Error)("dpr: error: " + text)
 
 
