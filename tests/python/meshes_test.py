@@ -176,6 +176,18 @@ class LossesTest(unittest.TestCase):
         self.assertTrue((first[:, :2].sum(1) <= 2 + 1e-5).all())
         with self.assertRaisesRegex(ValueError, "area"):
             dpr.sample_points(np.zeros((3, 3), np.float32), [[0, 1, 2]], 5)
+        for count in (0, 4, np.int64(5)):
+            found = dpr.sample_points(vertices.tolist(), [[0, 1, 2], [3, 4, 5]], count, seed=3)
+            self.assertEqual((found.shape, found.dtype), ((count, 3), np.float32))
+            if torch:
+                same = dpr.sample_points(torch.from_numpy(vertices), [[0, 1, 2], [3, 4, 5]], count, seed=3)
+                np.testing.assert_allclose(same, found, atol=1e-6)
+        for wrong, message in (((vertices[:, :2], [[0, 1, 2]], 5), r"vertices .*got \[6, 2\]"), ((vertices, [0, 1, 2], 5), "faces"),
+                               ((vertices, [[0, 1, -1]], 5), "faces .*from -1 to 1, expected indices from 0 to 5"),
+                               ((vertices, [[0, 1, 6]], 5), "faces .*from 0 to 6"), ((vertices, [[0, 1, 2]], -5), "count .*-5"),
+                               ((vertices, [[0, 1, 2]], 1.5), "count .*1.5")):
+            with self.assertRaisesRegex(ValueError, message + ".*expected" * ("expected" not in message)):
+                dpr.sample_points(*wrong)
 
     def test_chamfer(self):
         a, b = moved(np.zeros((1500, 3)), 1), moved(np.zeros((1100, 3)), 2)

@@ -1,4 +1,5 @@
 """Losses of a mesh's shape, and of sets of points."""
+import numbers
 import sys
 from typing import Any, Optional
 
@@ -150,21 +151,31 @@ def _constant(array):
 
 def sample_points(vertices: Array, faces: Array, count: int, seed: Optional[int] = None) -> Array:
     """Points of a mesh's surface, uniform by area: [count, 3], of vertices [V, 3] and faces [F, 3]. With PyTorch and JAX a
-    function of the vertices. seed: of NumPy's generator; other points every time without. Raises ValueError for a
-    surface without area, but not while JAX traces."""
-    faces = _arrays.to_numpy(_arrays.converted("faces", _arrays.from_numbers(faces, True), True, "dpr.sample_points"))
-    faces = faces.astype(np.int64)
+    function of the vertices. seed: of NumPy's generator; other points every time without. Raises ValueError for other
+    shapes and indices, and for a surface without area, but for this not while JAX traces."""
+    where = "dpr.sample_points"
+    vertices, faces = _arrays.from_numbers(vertices), _arrays.from_numbers(faces, True)
+    _arrays.require_array("vertices", vertices, where)
+    faces = _arrays.to_numpy(_arrays.converted("faces", faces, True, where)).astype(np.int64)
+    for name, array, expected in (("vertices", vertices, "[V, 3]"), ("faces", faces, "[F, 3]")):
+        if len(array.shape) != 2 or array.shape[1] != 3:
+            _arrays.fail(ValueError, name, list(array.shape), expected, where)
+    if faces.size and not (faces.min() >= 0 and faces.max() < vertices.shape[0]):
+        _arrays.fail(ValueError, "faces", f"indices from {faces.min()} to {faces.max()}",
+                     f"indices from 0 to {vertices.shape[0] - 1}, of vertices", where)
+    if not (isinstance(count, numbers.Integral) and count >= 0):
+        _arrays.fail(ValueError, "count", repr(count), "a whole number, at least 0", where)
     lib, values = _constant(vertices)
     values = values.astype(np.float64) if lib is np else values
     a, b, c = (values[faces[:, k]] for k in range(3))
     sums = lib.cumsum((_cross(b - a, c - a) ** 2).sum(-1) ** 0.5)
     if lib is np and not (len(faces) and 0 < sums[-1] < np.inf):
-        _arrays.fail(ValueError, "vertices", "a surface without area", "finite vertices and faces", "dpr.sample_points")
+        _arrays.fail(ValueError, "vertices", "a surface without area", "finite vertices and faces", where)
     random = np.random.default_rng(seed)
     chosen = lib.searchsorted(sums, random.random(count) * sums[-1], side="right").clip(0, len(faces) - 1)
     root, along = random.random((count, 1)) ** 0.5, random.random((count, 1))
     weights = np.concatenate([1 - root, root * (1 - along), root * along], 1)[..., None]
-    corners = vertices[(lib.asarray(faces) if lib is not np else faces)[chosen]]
+    corners = _arrays.rows(vertices, lib.asarray(faces)[chosen].reshape(-1)).reshape(count, 3, 3)
     return (corners * _like(vertices, weights)).sum(-2)
 
 
