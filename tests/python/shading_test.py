@@ -205,6 +205,12 @@ class EnvironmentTest(unittest.TestCase):
                 shading.Environment(image)
         with self.assertRaisesRegex(ValueError, r"image \(dpr.shading\): got numbers that are not finite"):
             shading.Environment(torch.full((8, 16, 3), float("nan")))
+        environment, rough = shading.Environment(random(8, 16, 3)), torch.tensor([[0.5], [math.nan]])
+        for roughness in (math.nan, rough):
+            for call in (lambda: environment.specular(UP.expand(2, 3), roughness),
+                         lambda: environment.shade(UP.expand(2, 3), UP, torch.ones(3), 0.5, roughness)):
+                with self.assertRaisesRegex(ValueError, r"roughness \(dpr.shading\): got NaN"):
+                    call()
         with self.assertRaisesRegex(ValueError, "vertices.*a tensor of PyTorch"):
             shading.vertex_normals(random(4, 3).numpy(), torch.tensor([[0, 1, 2]]))
 

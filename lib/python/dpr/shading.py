@@ -263,7 +263,10 @@ class Environment:
     def specular(self, directions: Tensor, roughness: Number) -> Tensor:
         """Mean radiance [..., 3] around reflected directions [..., 3], for a roughness [..., 1] or a number, 0 to 1."""
         levels = [self._with_poles, *self._means[1:]]
-        place = _share(torch.as_tensor(roughness, dtype=directions.dtype)) * (len(levels) - 1)
+        roughness = torch.as_tensor(roughness, dtype=directions.dtype)
+        if bool(roughness.isnan().any()):
+            _fail("roughness", "NaN", "[..., 1] or a number, 0 to 1")
+        place = _share(roughness) * (len(levels) - 1)
         lower = place.detach().floor().clamp(max=len(levels) - 2)
         above, total = place - lower, torch.zeros_like(directions)
         for k, level in enumerate(levels):
