@@ -71,6 +71,16 @@ class CamerasTest(unittest.TestCase):
         self.assertEqual(dpr.look_at([0, 0, 4]).dtype, np.float32)
         self.assertEqual(dpr.look_at(np.zeros((5, 3)) + [0, 1, 4]).shape, (5, 4, 4))
         self.assertEqual(dpr.perspective([30, 60], 8, 8).shape, (2, 4))
+        for wrong, words in ((([0, np.nan, 0],), r"eye .*got infinity or NaN"), ((EYE, [np.inf, 0, 0]), "target .*got infinity"),
+                             ((np.eye(3)[:2], 5 + np.eye(3)), r"eye .*got \[2, 3\], expected .*\[3, 3\]")):
+            with self.assertRaisesRegex(ValueError, words):
+                dpr.look_at(*wrong)
+        for call in (lambda *size: dpr.perspective(35, *size), lambda *size: cameras.from_opengl(glu_perspective(35), *size),
+                     lambda *size: cameras.from_pytorch3d(np.eye(3), [0, 0, 4], *size, fov_degrees=35),
+                     lambda width, height: cameras.from_softras(EYE, width if height == 64 else height)):
+            for size in ((-64, 64), (64, 0), (64, np.nan)):
+                with self.assertRaisesRegex(ValueError, "(width|height|size) .*got .*, expected pixels, above 0"):
+                    call(*size)
         for wrong in ((EYE, EYE), (EYE, TARGET, EYE - TARGET), (EYE, TARGET, [0, 0, 0]), (EYE[:2],)):
             with self.assertRaisesRegex(ValueError, "dpr.cameras"):
                 dpr.look_at(*wrong)
@@ -118,6 +128,9 @@ class CamerasTest(unittest.TestCase):
                             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y)
                 # Whole numbers are OpenCV's pixels' centres.
                 self.assert_at([K[0, 0] * x + K[0, 2] + 0.5, K[1, 1] * y + K[1, 2] + 0.5], point, views, intrinsics)
+        for lens in (distortion, distortion[:4]):
+            for given in (lens[:, None], lens[None]):
+                np.testing.assert_array_equal(cameras.from_opencv(R, t, K, given)[1], cameras.from_opencv(R, t, K, lens)[1])
         # Beside cv2.fisheye's own D, a column, and a batch.
         D = np.array([0.2, -0.1, 0.05, -0.02])
         for fisheye in (D, D[:, None], D[None]):

@@ -56,6 +56,12 @@ def _batch(name, array, *shape):
     return array
 
 
+def _require_size(width, height):
+    for name, size in (("width", width), ("height", height)):
+        if not 0 < size < np.inf:
+            _fail(name, size, "pixels, above 0")
+
+
 def _columns(lib, *columns):
     """Arrays [N] or [N, ...] side by side, each also of N = 1."""
     broadcast = lib.broadcast_arrays if hasattr(lib, "broadcast_arrays") else lib.broadcast_tensors
@@ -88,11 +94,24 @@ def _axes(lib, eye, target, up):
     return right, _cross(lib, back, right), back
 
 
+def _points(names, arrays):
+    """[N, 3] or [1, 3] of each."""
+    arrays = [_batch(name, array, 3) for name, array in zip(names, arrays)]
+    count = max(array.shape[0] for array in arrays)
+    for name, array in zip(names, arrays):
+        known = _arrays.known(array)
+        if array.shape[0] not in (1, count):
+            _fail(name, list(array.shape), f"[3], [1, 3] or [{count}, 3], as {' and '.join(names)} go together")
+        if known is not None and not np.isfinite(known).all():
+            _fail(name, "infinity or NaN", "finite numbers")
+    return arrays
+
+
 def look_at(eye: Array, target: Array = (0, 0, 0), up: Array = (0, 1, 0)) -> Array:
     """Views [N, 4, 4] of cameras at `eye` that look at `target`: points [3] or [N, 3] in world space. `up` is a
     direction, upwards in the image. Raises ValueError where eye and target are one, and where up is along the view."""
     lib, arrays = _together(eye, target, up)
-    eye, target, up = (_batch(name, array, 3) for name, array in zip(("eye", "target", "up"), arrays))
+    eye, target, up = _points(("eye", "target", "up"), arrays)
     axes = _axes(lib, eye, target, up)
     rows = lib.stack(list(axes), 1)
     return _affine(lib, rows, -(rows * eye[:, None]).sum(-1))
@@ -101,6 +120,7 @@ def look_at(eye: Array, target: Array = (0, 0, 0), up: Array = (0, 1, 0)) -> Arr
 def perspective(fov_y_degrees: Array, width: int, height: int) -> Array:
     """Intrinsics [N, 4] of a field of view from the lower to the upper edge, a number or [N]; the axis is in the middle.
     Raises ValueError for an angle that is not between 0 and 180 degrees."""
+    _require_size(width, height)
     lib, (fov,) = _together(fov_y_degrees)
     known = _arrays.known(fov)
     if known is not None and not ((known > 0) & (known < 180)).all():
@@ -120,6 +140,7 @@ def from_opengl(projection: Array, width: int, height: int) -> Array:
     projection[1, 1] > 0: images have the upper row first, and nvdiffrast's the lower one: image.flip(1) compares. With
     projection[1, 1] < 0, as in nvdiffrast's samples, both have the rows in one order. [N, 1] of orthographic matrices,
     which must not be off centre. znear and zfar are settings. Raises ValueError for another kind of matrix."""
+    _require_size(width, height)
     lib, (projection,) = _together(projection)
     matrix = _batch("projection", projection, 4, 4)
     known = _arrays.known(matrix)
@@ -167,7 +188,7 @@ def from_opencv(rotation: Array, translation: Array, matrix: Array, distortion: 
     views = _affine(lib, signs[:, None] * rotation, signs * translation)
     columns = [matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 0, 2] + 0.5, matrix[:, 1, 2] + 0.5]
     if lens is not None:
-        if fisheye is not None and tuple(lens.shape) == (4, 1):  # a column, as OpenCV has it
+        if lens.ndim == 2 and lens.shape[1] == 1:  # a column, as OpenCV has it
             lens = lens[:, 0]
         count = lens.shape[-1] if lens.ndim else 0
         if count not in counts:
@@ -188,6 +209,7 @@ def from_pytorch3d(R: Array, T: Array, width: int, height: int, *, fov_degrees: 
     fov_degrees and focal_length."""
     if (fov_degrees is None) == (focal_length is None):
         _fail("fov_degrees", "both or none of fov_degrees and focal_length", "one of them")
+    _require_size(width, height)
     lib, (R, T, focal) = _together(R, T, focal_length if fov_degrees is None else fov_degrees)
     R, T = _batch("R", R, 3, 3), _batch("T", T, 3)
     signs = _together(R, [-1, 1, -1])[1][1]
@@ -210,9 +232,11 @@ def from_softras(eye: Array, size: int, *, viewing_angle: Array = 30, at: Array 
 
     Their images are mirror images, x to the left, and so are those of these views, whose determinants are -1. With
     lights, normals that point away from the camera are lit otherwise than in a view without a mirror."""
-    lib, arrays = _together(eye, at, up, viewing_angle)
-    eye, at, up = (_batch(name, array, 3) for name, array in zip(("eye", "at", "up"), arrays))
+    if not 0 < size < np.inf:
+        _fail("size", size, "pixels, above 0")
+    lib, (*arrays, angle) = _together(eye, at, up, viewing_angle)
+    eye, at, up = _points(("eye", "at", "up"), arrays)
     right, upwards, back = _axes(lib, eye, at, up)
     rows = lib.stack([-right, upwards, back], 1)
-    focal = (size / 2) / lib.tan(_batch("viewing_angle", arrays[3]) * (np.pi / 180))
+    focal = (size / 2) / lib.tan(_batch("viewing_angle", angle) * (np.pi / 180))
     return _affine(lib, rows, -(rows * eye[:, None]).sum(-1)), _intrinsics(lib, focal, size, size)
