@@ -80,6 +80,7 @@ std::vector<Mode> modes_of(const OptionValue& value, const std::array<std::strin
 /// Checks the planes that are set; one that is not is put far enough from the other.
 void validate_clipping(const std::optional<float>& znear, const std::optional<float>& zfar) {
   Camera camera;
+  if (zfar && !znear) checks::require_positive(*zfar, "zfar (camera)");
   camera.znear = znear.value_or(zfar ? *zfar / 2 : 1);
   camera.zfar = zfar.value_or(2 * camera.znear);
   validate(camera);

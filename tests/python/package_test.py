@@ -422,6 +422,7 @@ class PackageTest(RenderTest):
             (ValueError, "name .* got \"backgroud\", .* did you mean 'background'", {"backgroud": torch.ones(3)}),
             (RuntimeError, "cull", {"cull": "both"}),
             (RuntimeError, "zfar", {"znear": 3, "zfar": 2}),
+            (RuntimeError, "zfar .* got inf, expected a finite number", {"zfar": float("inf")}),
             (RuntimeError, "no-such-device", {"device": "no-such-device"}),
         ]
         for kind, words, change in wrong:
