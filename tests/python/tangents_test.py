@@ -277,6 +277,22 @@ class TorchTest(TangentsTest):
         background = self.given["background"]
         np.testing.assert_allclose(torch.func.jacfwd(brightness)(background), torch.func.jacrev(brightness)(background),
                                    atol=1e-6)
+        # Of samples and textures too; torch.autograd has its Jacobians row by row.
+        vertices, colors, texels = self.given["vertices"], random(4, 3), torch.as_tensor(random(5, 4, 2))
+
+        def shaded(vertices):
+            samples = dpr.rasterize(vertices, FACES, *cameras(1), width=SIZE, height=SIZE)
+            image = samples.resolve(samples.interpolate(torch.as_tensor(colors)) + samples.depth[..., None])
+            return image.mean((0, 1, 2))
+
+        places = torch.as_tensor(random(1, 2, 2, 2))
+        for function, at in ((shaded, vertices), (lambda places: dpr.texture(texels, places), places),
+                             (lambda texels: dpr.texture(texels, places), texels)):
+            expected = torch.autograd.functional.jacobian(function, at)
+            for jacobian in (torch.func.jacrev, torch.func.jacfwd):
+                np.testing.assert_allclose(jacobian(function)(at), expected, atol=1e-5 * float(expected.abs().max()))
+        batch = torch.func.vmap(lambda places: dpr.texture(texels, places))(torch.stack((places, places / 2)))
+        np.testing.assert_array_equal(batch[1], dpr.texture(texels, places / 2))
         for twice in (lambda f: torch.func.jacfwd(torch.func.grad(f)),
                       lambda f: torch.func.grad(lambda b: torch.func.jvp(f, (b,), (b,))[1])):
             with self.assertRaisesRegex((RuntimeError, NotImplementedError), "no second derivatives"):

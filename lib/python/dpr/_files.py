@@ -69,10 +69,11 @@ def write_mesh(file: Union[str, "os.PathLike[str]"], vertices: Array, faces: Arr
                materials: Any = None, face_materials: Optional[Array] = None) -> None:
     """Writes a mesh as OBJ, PLY or GLB, by the extension, whole or not at all.
 
-    The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8 bits;
-    texcoords go without them too, but not into PLY; OBJ has no face_colors; PLY's colours are bytes, clamped to [0, 1] as texels are. GLB numbers vertices anew, in the order
-    of the faces, and has none that no face uses. Materials and opacities are left out, with a UserWarning. Raises OSError
-    (dpr.IoError) where the file cannot be written, ValueError (dpr.InvalidArgument) for what it cannot hold.
+    The arguments are those of one mesh, as Renderer has them. GLB alone takes textures, which become PNG, sRGB in 8
+    bits; texcoords go without them too, but not into PLY; OBJ has no face_colors; PLY's colours are bytes, clamped to
+    [0, 1] as texels are. GLB numbers vertices anew, in the order of the faces, and has none that no face uses.
+    Materials and opacities are left out, with a UserWarning. Raises OSError (dpr.IoError) where the file cannot be
+    written, ValueError (dpr.InvalidArgument) for what it cannot hold.
     """
     for what, left_out in (("materials", (materials, face_materials)), ("opacities", (opacities, face_opacities))):
         if any(array is not None for array in left_out):

@@ -80,22 +80,22 @@ class _Gradients(_torch.Derivative):
 
 @_torch.one_forward
 class _Tangents(_torch.Derivative):
-    """(tangents of the tensors with these numbers, all tensors) to that of the values."""
+    """(tangents of the tensors with these numbers, all tensors) to that of the values, a tuple of one."""
 
     @staticmethod
     def forward(lookup, numbers, *tensors):
         arrays = list(map(_arrays.to_numpy, tensors))
         moving = {i: tangent[None] for i, tangent in zip(numbers, arrays)}
-        return torch.from_numpy(Read(lookup, arrays[len(numbers):]).tangents(moving)[0][0])
+        return (torch.from_numpy(Read(lookup, arrays[len(numbers):]).tangents(moving)[0][0]),)
 
 
 @_torch.one_forward
 class _Texture(torch.autograd.Function):
-    """(tensors of a lookup) to values."""
+    """(tensors of a lookup) to values, a tuple of one."""
 
     @staticmethod
     def forward(lookup, *tensors):
-        return torch.from_numpy(Read(lookup, list(map(_arrays.to_numpy, tensors))).outputs[0])
+        return (torch.from_numpy(Read(lookup, list(map(_arrays.to_numpy, tensors))).outputs[0]),)
 
     @staticmethod
     def setup_context(ctx, inputs, outputs):
@@ -114,11 +114,15 @@ class _Texture(torch.autograd.Function):
         numbers = tuple(i for i, tangent in enumerate(tangents) if tangent is not None)
         return _Tangents.apply(ctx.lookup, numbers, *(tangents[i] for i in numbers), *ctx.saved_tensors)
 
+    @staticmethod
+    def vmap(info, dimensions, *inputs):
+        return _torch.one_by_one(_Texture, info, dimensions, *inputs)
+
 
 def read(lookup, arrays):
     """A lookup's values; differentiable."""
     tensors = [array if isinstance(array, Tensor) else torch.from_dlpack(_arrays.to_numpy(array)) for array in arrays]
-    return _Texture.apply(lookup, *tensors)
+    return _Texture.apply(lookup, *tensors)[0]
 
 
 def _levels(tex, mip, most, is_cube):

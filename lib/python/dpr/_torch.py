@@ -51,9 +51,21 @@ def one_forward(function):
     return function
 
 
+def one_by_one(function, info, dimensions, *inputs):
+    """Its results, a tuple, for a batch of tensors."""
+    found = [function.apply(*(given if dimension is None or not isinstance(given, torch.Tensor) else given.select(dimension, i)
+                              for given, dimension in zip(inputs, dimensions))) for i in range(info.batch_size)]
+    rows = tuple(None if row[0] is None else torch.stack(row) for row in zip(*found))
+    return rows, tuple(None if row is None else 0 for row in rows)
+
+
 class Derivative(torch.autograd.Function):
     """One that has none itself. The tensors by which it was taken are among its arguments: a second one is refused, not
-    dropped."""
+    dropped. Those of a batch of directions or gradients are taken one after the other, unless it says how else."""
+
+    def __init_subclass__(cls):
+        if "vmap" not in vars(cls):
+            cls.vmap = staticmethod(functools.partial(one_by_one, cls))
 
     @staticmethod
     def setup_context(ctx, inputs, outputs):
@@ -75,13 +87,6 @@ class _Gradients(Derivative):
     def forward(call, count, *tensors):
         found = _gradients(call.rendered, tensors[:count], tensors[count:])
         return tuple(gradient for gradient in found if gradient is not None)
-
-    @staticmethod
-    def vmap(info, dimensions, call, count, *tensors):
-        found = [_Gradients.apply(call, count, *(tensor if dimension is None else tensor.select(dimension, i)
-                                                 for tensor, dimension in zip(tensors, dimensions[2:])))
-                 for i in range(info.batch_size)]
-        return tuple(torch.stack(rows) for rows in zip(*found)), (0,) * len(call.wanted)
 
 
 def _stretched(info, tensors, dimensions):
