@@ -102,6 +102,11 @@ void require_parts(const SmoothingOptions& given, const Smoothing& smoothing) {
   constexpr const char *k_joint = "the joint composition", *k_weight = "the barrier alone has it";
   require(has_barrier, "alpha", given.alpha.has_value(), k_joint, k_weight);
   require(has_barrier, "background_depth", given.background_depth.has_value(), k_joint, k_weight);
+  const bool has_blurred_triangles = smoothing.noise != Noise::pixel;
+  constexpr const char *k_pixel = "noise of the pixel (preset pixel)", *k_whole = "it shows triangles whole";
+  require(has_blurred_triangles, "alpha", given.alpha.has_value(), k_pixel, k_whole);
+  require(has_blurred_triangles, "occupancy_threshold", given.occupancy_threshold.has_value(), k_pixel,
+          k_whole);
   constexpr const char *k_exact = "the exact estimators", *k_draws = "monte_carlo alone draws samples";
   require(is_sampled(smoothing), "samples", given.samples.has_value(), k_exact, k_draws);
   require(is_sampled(smoothing), "draws", given.draws.has_value(), k_exact, k_draws);

@@ -56,6 +56,8 @@ class ArgumentsTest(unittest.TestCase):
                                 ({"preset": "rigid", "occupancy_prior": "cauchy"}, "occupancy_prior"),
                                 ({"alpha": 2}, "alpha .* got a value with the joint composition"),
                                 ({"preset": "joint_gaussian", "background_depth": 0.1}, "background_depth"),
+                                ({"composition": "barrier", "alpha": 0.3}, "alpha .* got a value with noise of the pixel"),
+                                ({"occupancy_threshold": 0.1}, "occupancy_threshold .* got a value with noise of the pixel"),
                                 ({"samples": 64}, "samples .* got a value with the exact estimators"),
                                 ({"draws": "antithetic"}, "draws"),
                                 ({"preset": "gaussian", "variance_reduction": "none"}, "variance_reduction")]:
@@ -138,7 +140,8 @@ class ArgumentsTest(unittest.TestCase):
         with self.assertRaisesRegex(TypeError, "width.*None"):
             changed.width = None
         np.testing.assert_allclose(profile(64, 48, preset="opendr", blur=1), profile(64, 48, preset="opendr"), atol=1e-6)
-        for wrong in ({"blur": 0.5, "sigma": 1e-3}, {"blur": -1}, {"blur": 0}, {"blur": float("inf")}, {"blur": "wide"}):
+        for wrong in ({"blur": 0.5, "sigma": 1e-3}, {"blur": -1}, {"blur": 0}, {"blur": float("inf")}, {"blur": "wide"},
+                      {"blur": True}):
             with self.assertRaisesRegex((ValueError, TypeError), "blur"):
                 profile(64, 48, **wrong)
             with self.assertRaisesRegex((ValueError, TypeError), "blur"):

@@ -90,7 +90,8 @@ class NumpyTest(TangentsTest):
         self.check(other_inputs(), SMOOTH)
         pixel = inputs()
         del pixel["blur"], pixel["gamma"], pixel["alpha"]
-        self.check({**pixel, "gamma": np.array(0.05, np.float32)}, {**SMOOTH, "preset": "pixel"})
+        self.check({**pixel, "gamma": np.array(0.05, np.float32)},
+                   {**SMOOTH, "preset": "pixel", "occupancy_threshold": None})
         one, other = inputs(), cameras(1)
         self.check({**one, "views": other[0], "colors": one["colors"][0]}, BARRIER)  # one camera, of two lenses
         self.check({**inputs(), "lights": {"ambient": np.float32([0.5, 0.4, 0.3]),

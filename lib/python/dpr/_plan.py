@@ -93,7 +93,7 @@ def power_of_blur(renderer_settings, width, height):
 
 
 def sigma_of_blur(blur, scale, power):
-    if not isinstance(blur, numbers.Real):
+    if not isinstance(blur, numbers.Real) or isinstance(blur, bool):
         fail(TypeError, "blur", repr(blur), _BLUR)
     if not 0 < blur < math.inf:
         fail(_library.InvalidArgument, "blur", blur, _BLUR)
