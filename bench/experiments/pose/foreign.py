@@ -1,7 +1,7 @@
 """Poses of pictures that another renderer made, under light that the scene file does not know.
 
     python -m venv venv && venv/bin/pip install mitsuba numpy
-    venv/bin/python foreign.py pictures FOLDER --scenes tests/data/foreign/*.json
+    venv/bin/python foreign.py pictures FOLDER --scenes tests/data/foreign/{bag,fish,spot}.json
     venv/bin/python foreign.py poses FOLDER --dpr build/release/bin/dpr -o foreign.json
 
 `pictures` path-traces every mesh from its own colours in random poses with Mitsuba 3: interreflection, an
@@ -65,6 +65,7 @@ def make_mesh(mi, mesh, rotation, glossy):
 
 
 def path_trace(mi, scene, rotation, random, samples, seed, pixel_format="rgb"):
+    """The picture of the scene's first mesh, which the rotation turns, and of its other meshes as they are."""
     camera_to_world = np.linalg.inv(scene["camera"]["view"])
 
     def place(distance):
@@ -80,7 +81,8 @@ def path_trace(mi, scene, rotation, random, samples, seed, pixel_format="rgb"):
                   "intensity": {"type": "rgb", "value": random.uniform(5, 40, 3).tolist()}},
         "lamp": {"type": "sphere", "center": place(random.uniform(3, 5)).tolist(), "radius": 0.5,
                  "emitter": {"type": "area", "radiance": {"type": "rgb", "value": random.uniform(5, 25, 3).tolist()}}},
-        "mesh": make_mesh(mi, scene["meshes"][0], rotation, glossy=seed % 2 == 1)}
+        **{f"mesh{i}": make_mesh(mi, mesh, rotation if i == 0 else np.eye(3), glossy=seed % 2 == 1)
+           for i, mesh in enumerate(scene["meshes"])}}
     camera_to_world[:3, [0, 2]] *= -1  # Mitsuba's cameras look along +z, and x points to the left
     description["sensor"] = {
         "type": "perspective", "fov": scene["camera"]["fov_y_degrees"], "fov_axis": "y",

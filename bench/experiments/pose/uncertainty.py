@@ -1,7 +1,7 @@
 """How true the deviations and the verdicts of `dpr pose` are, on pictures that it did not make.
 
     python -m venv venv && venv/bin/pip install mitsuba numpy pillow opencv-python-headless
-    venv/bin/python uncertainty.py pictures FOLDER --scenes tests/data/foreign/*.json
+    venv/bin/python uncertainty.py pictures FOLDER --scenes tests/data/foreign/{bag,fish,spot}.json
     venv/bin/python uncertainty.py photographs FOLDER --data examples/data      # of Debian's opencv-doc
     venv/bin/python uncertainty.py poses FOLDER --dpr build/release/bin/dpr -o uncertainty.json
     venv/bin/python uncertainty.py together FOLDER --dpr build/release/bin/dpr -o calibration.json
@@ -108,16 +108,24 @@ def save(path, linear, quality):
         image.save(path.with_suffix(".png"))
 
 
+def add_clutter(random, image, coverage):
+    return image + (1 - coverage) * smooth_noise(random, *image.shape[:2], int(random.integers(12, 40)))
+
+
+def hide(random, image, coverage, least, most):
+    """Part of the object, between these, by a square of one colour."""
+    rows, columns = np.nonzero(coverage[..., 0] > 0.5)
+    i = random.integers(len(rows))
+    side = int(np.sqrt(len(rows) * random.uniform(least, most)))
+    image[max(rows[i] - side // 2, 0):rows[i] + side // 2 + 1,
+          max(columns[i] - side // 2, 0):columns[i] + side // 2 + 1] = random.uniform(0, 1, 3)
+
+
 def spoil(random, kind, image, coverage):
     """What cameras and rooms do to a picture. Returns it with its quality as JPEG, 0: none."""
-    height, width = image.shape[:2]
     if kind == "clutter":
-        image = image + (1 - coverage) * smooth_noise(random, height, width, int(random.integers(12, 40)))
-        rows, columns = np.nonzero(coverage[..., 0] > 0.5)
-        i = random.integers(len(rows))
-        side = int(np.sqrt(len(rows) * random.uniform(0.05, 0.2)))
-        image[max(rows[i] - side // 2, 0):rows[i] + side // 2 + 1,
-              max(columns[i] - side // 2, 0):columns[i] + side // 2 + 1] = random.uniform(0, 1, 3)
+        image = add_clutter(random, image, coverage)
+        hide(random, image, coverage, 0.05, 0.2)
     image = blurred(image, random.uniform(0.4, 1.0) if kind in ("blur", "camera") else 0)
     if kind in ("noise", "camera"):
         image = image + random.normal(size=image.shape) * random.uniform(0.005, 0.03)
