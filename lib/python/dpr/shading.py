@@ -264,7 +264,8 @@ class Environment:
         """Mean radiance [..., 3] around reflected directions [..., 3], for a roughness [..., 1] or a number, 0 to 1."""
         levels = [self._with_poles, *self._means[1:]]
         roughness = torch.as_tensor(roughness, dtype=directions.dtype)
-        if bool(roughness.isnan().any()):
+        known = _arrays.known(roughness)
+        if known is not None and np.isnan(known).any():
             _fail("roughness", "NaN", "[..., 1] or a number, 0 to 1")
         place = _share(roughness) * (len(levels) - 1)
         lower = place.detach().floor().clamp(max=len(levels) - 2)
