@@ -245,9 +245,10 @@ class DPR_API PoseSolver {
   /// From several initial poses at once (at least one). LeastSquares only.
   PoseResult solve(std::span<const Pose> initial, const Callback& callback = {}) const;
   /// From an unknown rotation. With a translation to look for the place is unknown too: hypotheses begin where the
-  /// object fills the box; without one, where it fills the silhouette; or else at places all over the picture, from half
-  /// to twice the distance of the scene's, and where it fills a mask that leaves out some of the picture. Without a
-  /// translation to look for it is the scene's. LeastSquares with rotations only.
+  /// object fills the box; without one, where it fills the silhouette; or else where it fills what differs from the
+  /// scene's background; and, if that explains nothing, is cut by the picture, or the loss is robust, at places all over
+  /// the picture, from half to twice the distance of the scene's, and where it fills a mask that leaves out some of the
+  /// picture. Without a translation to look for it is the scene's. LeastSquares with rotations only.
   PoseResult search(const Callback& callback = {}) const;
 
  private:

@@ -16,7 +16,7 @@
 #include "solve/pose_descent.hpp"
 #include "solve/pose_problem.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_search.hpp"
+#include "solve/pose_fit.hpp"
 
 namespace dpr {
 namespace {

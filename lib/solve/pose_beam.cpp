@@ -59,7 +59,7 @@ bool refine_distinct(PoseLevel& level, const PoseSpace& space, std::vector<Candi
   const unsigned enough = work.iterations, few = std::min(k_few, enough);
   for (Candidate& candidate : candidates) candidate.restart();
   bool goes_on = refine(level, space, candidates, {few, few}, report);
-  keep_distinct(candidates.size());
+  keep_distinct(std::min(candidates.size(), work.promising));
   if (goes_on && enough > few)
     goes_on = refine(level, space, candidates, {enough - few, k_patience * enough - few}, report);
   keep_distinct(work.keep);

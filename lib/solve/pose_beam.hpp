@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,8 @@ struct BeamWork {
   unsigned iterations = 0;  ///< 0: they are only judged at the level
   std::size_t keep = 1;
   double wrong_loss = 0;  ///< of a pose that explains nothing
+  std::size_t promising =
+      std::numeric_limits<std::size_t>::max();  ///< so many are refined beyond the first steps
 };
 
 /// Turns all candidates until they stand still, and keeps the best distinct ones, the best first. Returns false if

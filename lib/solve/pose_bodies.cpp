@@ -12,7 +12,7 @@
 #include "dpr/error.hpp"
 #include "dpr/pose.hpp"
 #include "solve/pose_body.hpp"
-#include "solve/pose_search.hpp"
+#include "solve/pose_fit.hpp"
 #include "solve/pose_space.hpp"
 
 namespace dpr {

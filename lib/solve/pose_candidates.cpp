@@ -41,12 +41,12 @@ void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const 
   candidates.erase(std::remove_if(begin, candidates.end(), is_hopeless), candidates.end());
 }
 
-bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal) {
+bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal, double other) {
   constexpr double k_nearly = 1.25,
                    k_other = 0.2;  // of the object's radius, by which another pose moves its rim
   const Candidate& best = candidates.front();
   return std::ranges::any_of(candidates, [&](const Candidate& c) {
-    return c.equations.loss > equal && c.equations.loss < k_nearly * best.equations.loss &&
+    return c.equations.loss > equal && c.equations.loss - other < k_nearly * (best.equations.loss - other) &&
            space.distance(c.hypothesis, best.hypothesis) > k_other * space.radius_ndc();
   });
 }

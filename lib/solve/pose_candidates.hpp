@@ -33,8 +33,9 @@ void drop_hopeless(std::vector<Candidate>& candidates, std::size_t first, const 
                    double wrong_loss);
 
 /// True if another pose leaves less than a quarter more than the best, the first, yet more than `equal`: either may
-/// be right.
-bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal);
+/// be right. Of all losses, the best's parts of `other` say nothing against it.
+bool is_doubtful(std::span<const Candidate> candidates, const PoseSpace& space, double equal,
+                 double other = 0);
 
 /// Rotations by half a turn about each of the axes of inertia of an object with these points, through its origin: what
 /// many an object looks much the same after.

@@ -19,7 +19,7 @@
 #include "solve/pose_beam.hpp"
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_search.hpp"
+#include "solve/pose_fit.hpp"
 
 namespace dpr {
 namespace {

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "scene/lens.hpp"
-#include "solve/pose_window.hpp"
+#include "solve/extent.hpp"
 #include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
 
@@ -67,6 +67,31 @@ void add_places(const Scene& scene, double distance, double radius, std::vector<
   }
 }
 
+/// Of what a picture shows before the scene's background, where the object is all that the scene has.
+std::optional<PoseBox> extent_of_target(const PoseProblem& problem) {
+  const Scene& scene = problem.scene;
+  const bool is_all = problem.options.meshes.empty() || problem.options.meshes.size() == scene.meshes.size();
+  const bool is_unknown = method_of(problem.options).unknown_background;
+  if (!is_all || is_unknown || problem.target.pixels.empty() || scene.camera.orthographic_height) return {};
+  return extent_before(problem.target, scene.background);
+}
+
+/// Boxes of an object of which the picture shows what is in the box, further on beyond the sides that it touches.
+std::vector<PoseBox> grown_beyond(const PoseBox& box, const Scene& scene) {
+  const glm::vec2 picture(scene.width, scene.height), low(box.x, box.y), size(box.width, box.height),
+      high = low + size;
+  std::vector<PoseBox> grown;
+  for (const float part : {0.4F, 1.0F}) {
+    glm::vec2 from = low, to = high;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (low[axis] <= 0) from[axis] -= part * size[axis];
+      if (high[axis] >= picture[axis]) to[axis] += part * size[axis];
+    }
+    if (from != low || to != high) grown.push_back({from.x, from.y, to.x - from.x, to.y - from.y});
+  }
+  return grown;
+}
+
 }  // namespace
 
 BoxPlaces::BoxPlaces(const Scene& scene, const PoseBody& body, const PoseBox& box)
@@ -121,25 +146,39 @@ std::optional<PoseBox> box_of_search(const PoseOptions& options, bool anywhere) 
   return is_all ? std::nullopt : box;
 }
 
-PosePlaces::PosePlaces(const Scene& scene, const PoseOptions& options, const Pose& initial, bool anywhere)
-    : scene_(scene), start_(initial), about_(initial) {
+PosePlaces::PosePlaces(const PoseProblem& problem, const Pose& initial, bool anywhere)
+    : scene_(problem.scene), start_(initial), about_(initial) {
   constexpr std::size_t k_enough = 15;  // rotations that tell the distance
+  const PoseOptions& options = problem.options;
   const LeastSquares& method = method_of(options);
-  const PoseBody body(scene, options.meshes);
-  for (const glm::dvec3& p : body.points(scene)) radius_ = std::max(radius_, glm::length(p));
+  const PoseBody body(scene_, options.meshes);
+  for (const glm::dvec3& p : body.points(scene_)) radius_ = std::max(radius_, glm::length(p));
   if (!options.solve_translation) return;
-  const std::optional<PoseBox> box = box_of_search(options, anywhere);
+  std::optional<PoseBox> box = box_of_search(options, anywhere);
   const bool is_silhouette = !method.silhouette.image.pixels.empty();
+  is_mask_ = box && !method.box && !is_silhouette;
+  if (!box && anywhere) {
+    box = extent_of_target(problem);
+    if (box) {
+      for (const PoseBox& grown : grown_beyond(*box, scene_)) beyond_.emplace_back(scene_, body, grown);
+    }
+  }
   scans_ = anywhere && !method.box && !is_silhouette;
   tries_start_ = anywhere && !method.box && box;
   if (!box) return;
-  is_mask_ = !method.box && !is_silhouette;
-  box_.emplace(scene, body, *box);
+  box_.emplace(scene_, body, *box);
   std::vector<Hypothesis> guesses = grid(k_enough);
   const auto middle = guesses.begin() + std::ssize(guesses) / 2;
-  std::ranges::nth_element(guesses, middle, {},
-                           [&](const Hypothesis& h) { return view_depth(scene.camera, h.pose.translation); });
+  std::ranges::nth_element(guesses, middle, {}, [&](const Hypothesis& h) {
+    return view_depth(scene_.camera, h.pose.translation);
+  });
   about_.translation = middle->pose.translation;
+}
+
+std::optional<PoseBox> whole_extent(const PoseProblem& problem) {
+  if (method_of(problem.options).robust || !problem.options.solve_translation) return {};
+  const std::optional<PoseBox> box = extent_of_target(problem);
+  return box && grown_beyond(*box, problem.scene).empty() ? box : std::nullopt;
 }
 
 std::vector<LevelShape> PosePlaces::shapes(std::vector<LevelShape> shapes, const PoseSpace& space) const {
@@ -196,6 +235,8 @@ std::vector<PlaceGroup> PosePlaces::others(PoseLevel& level, std::size_t rotatio
   };
   if (tries_start_) add(all, k_of_start, [&](const glm::dmat3&) { return start_.translation; });
   if (is_mask_) add(all, k_of_start, [&](const glm::dmat3& r) { return box_->translation(r, k_further); });
+  for (const BoxPlaces& box : beyond_)
+    add(all, k_of_start, [&](const glm::dmat3& r) { return box.translation(r); });
   if (!scans_) return groups;
   for (const glm::dvec3& best : best_of_picture(level))
     add(some, k_of_place, [&](const glm::dmat3&) { return best; });

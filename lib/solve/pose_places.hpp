@@ -10,6 +10,7 @@
 #include "dpr/pose.hpp"
 #include "solve/pose_candidates.hpp"
 #include "solve/pose_level.hpp"
+#include "solve/pose_problem.hpp"
 
 namespace dpr {
 
@@ -37,12 +38,16 @@ struct PlaceGroup {
   std::size_t keep = 0;
 };
 
+/// Of a picture that shows something before the scene's background, and whole: its bounding box. None where the
+/// background is not known, the object is not all that the scene has, the loss is robust, or no translation is looked for.
+std::optional<PoseBox> whole_extent(const PoseProblem& problem);
+
 /// Where the hypotheses of a fit begin.
 class PosePlaces {
  public:
   /// For the scene's body, which turns about its origin. `anywhere`: of a search, for which the
   /// initial pose is a guess. Only with a translation to look for places differ from the initial one.
-  PosePlaces(const Scene& scene, const PoseOptions& options, const Pose& initial, bool anywhere);
+  PosePlaces(const PoseProblem& problem, const Pose& initial, bool anywhere);
 
   /// A pose at the place that is most likely known.
   const Pose& about() const { return about_; }
@@ -59,7 +64,8 @@ class PosePlaces {
   const Scene& scene_;
   Pose start_, about_;
   std::optional<BoxPlaces> box_;
-  bool is_mask_ = false;  // the box is that of a mask, which may be larger than the object
+  std::vector<BoxPlaces> beyond_;  // of an extent that the picture cuts: where the object goes on
+  bool is_mask_ = false;           // the box is that of a mask, which may be larger than the object
   bool tries_start_ = false, scans_ = false;
   double radius_ = 0;
 };

@@ -8,10 +8,7 @@
 #include <optional>
 
 #include "solve/pose_beam.hpp"
-#include "solve/pose_pivot.hpp"
-#include "solve/pose_places.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_window.hpp"
 
 namespace dpr {
 namespace {
@@ -117,7 +114,8 @@ FittedPose Fit::run() {
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scales(level.scales());
   wrong_ = wrong_loss(sampled);
-  const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough());
+  const double other = level.loss_parts(candidates_.front().hypothesis).sum();
+  const bool is_doubted = anywhere_ && is_doubtful(candidates_, space_, enough(), other);
   finish(level);
   const LossParts parts = level.loss_parts(candidates_.front().hypothesis);
   const double blank = sampled.blank_loss(),
@@ -280,9 +278,8 @@ void Fit::start(PoseLevel& level) {
 
 void Fit::work(PoseLevel& level, std::size_t keep) {
   const unsigned iterations = goes_on_ ? method_.iterations : 0;  // stopped: only judged at this level
-  goes_on_ = refine_distinct(level, space_, candidates_, {iterations, candidates_.size(), wrong_},
-                             [&] { return report(level); }) &&
-             goes_on_;
+  const BeamWork beam{iterations, candidates_.size(), wrong_, keep + keep / 2};
+  goes_on_ = refine_distinct(level, space_, candidates_, beam, [&] { return report(level); }) && goes_on_;
   std::vector<Candidate> kept;
   for (const Candidate& c : candidates_) {
     if (kept.size() < keep || c.is_initial) {
@@ -333,57 +330,12 @@ void Fit::choose_equals() {
   }
 }
 
-/// One picture, or several of the same scene in other cameras.
-FittedPose fit_about_middle(const Device& device, std::span<const PoseProblem> pictures,
-                            std::span<const Pose> initial, Foreknowledge known,
-                            const PoseSolver::Callback& callback) {
-  const PosePivot pivot(pictures.front().scene, pictures.front().options);
-  std::vector<PoseProblem> about_middle(pictures.begin(), pictures.end());
-  for (PoseProblem& picture : about_middle) {
-    const Camera camera = picture.scene.camera;
-    picture.scene = pivot.scene();
-    picture.scene.camera = camera;
-  }
-  std::vector<Pose> starts;
-  for (const Pose& pose : initial) starts.push_back(pivot.to_middle(pose));
-  PoseSolver::Callback report;
-  if (callback) {
-    report = [&](PoseIteration step) {
-      step.pose = pivot.to_origin(step.pose);
-      return callback(step);
-    };
-  }
-  const bool anywhere = known == Foreknowledge::place;
-  const PoseProblem& first = about_middle.front();
-  const PosePlaces places(first.scene, first.options, starts.front(), anywhere);
-  if (anywhere) starts = {places.about()};
-  FittedPose fitted = Fit(device, about_middle, starts, places, known, report).run();
-  PoseResult& result = fitted.result;
-  pivot.to_origin(result.pose, result.covariance);
-  result.pose = pivot.to_origin(result.pose);
-  result.start = initial.front();
-  for (PoseHypothesis& h : result.equals) h.pose = pivot.to_origin(h.pose);
-  for (PoseIteration& step : result.history) step.pose = pivot.to_origin(step.pose);
-  return fitted;
-}
-
 }  // namespace
 
-FittedPose fit_pose(const Device& device, std::span<const PoseProblem> pictures,
-                    std::span<const Pose> initial, Foreknowledge known,
-                    const PoseSolver::Callback& callback) {
-  const PoseProblem& first = pictures.front();
-  const std::optional<PoseBox> box = box_of_search(first.options, known == Foreknowledge::place);
-  if (!box || pictures.size() > 1) return fit_about_middle(device, pictures, initial, known, callback);
-  const PoseProblem part = cut_to_box(first.scene, first.target, first.options, *box);
-  return fit_about_middle(device, {&part, 1}, initial, known, callback);
-}
-
-FittedPose fit_pose(const Device& device, const Scene& scene, const Image& target, const PoseOptions& options,
-                    std::span<const Pose> initial, Foreknowledge known,
-                    const PoseSolver::Callback& callback) {
-  const PoseProblem picture{scene, target, options};
-  return fit_pose(device, {&picture, 1}, initial, known, callback);
+FittedPose search_pose(const Device& device, std::span<const PoseProblem> pictures,
+                       std::span<const Pose> initial, const PosePlaces& places, Foreknowledge known,
+                       const PoseSolver::Callback& callback) {
+  return Fit(device, pictures, initial, places, known, callback).run();
 }
 
 }  // namespace dpr

@@ -13,7 +13,7 @@
 #include "solve/pose_motion.hpp"
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_search.hpp"
+#include "solve/pose_fit.hpp"
 #include "solve/resample.hpp"
 #include "solve/track_levels.hpp"
 #include "solve/track_starts.hpp"

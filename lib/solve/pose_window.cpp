@@ -62,22 +62,6 @@ void validate_box(const PoseBox& box, const Scene& scene) {
     throw InvalidArgument("box (pose)", "an orthographic camera", "a perspective one, or a mask");
 }
 
-std::optional<PoseBox> extent(const Image& weights) {
-  float largest = 0;
-  for (const glm::vec4& pixel : weights.pixels) largest = std::max(largest, pixel.x);
-  if (!(largest > 0)) return {};
-  glm::ivec2 low(weights.width, weights.height), high(0);
-  for (int row = 0; row < weights.height; ++row) {
-    for (int column = 0; column < weights.width; ++column) {
-      if (!(weights.at(column, row).x > 0.5F * largest)) continue;
-      low = glm::min(low, glm::ivec2(column, row));
-      high = glm::max(high, glm::ivec2(column + 1, row + 1));
-    }
-  }
-  const glm::vec2 corner(low), size(high - low);
-  return PoseBox{corner.x, corner.y, size.x, size.y};
-}
-
 PoseProblem cut_to_box(const Scene& scene, const Image& target, const PoseOptions& options,
                        const PoseBox& box) {
   const Window window = window_about(box, scene.width, scene.height);

@@ -1,17 +1,12 @@
 // The part of the images in which an object is looked for.
 #pragma once
 
-#include <optional>
-
 #include "solve/pose_problem.hpp"
 
 namespace dpr {
 
 /// Throws InvalidArgument for a box that holds nothing of the scene's images.
 void validate_box(const PoseBox& box, const Scene& scene);
-
-/// Bounding box of the pixels whose first channel is above half of the largest; none where all are 0.
-std::optional<PoseBox> extent(const Image& weights);
 
 /// The problem in the pixels about a box alone: none is further away than a quarter of the larger side of the box. The
 /// box of the options, if there is one, moves along. The camera must be a perspective one.

@@ -7,7 +7,7 @@
 
 #include "dpr/pose_tracker.hpp"
 #include "solve/pose_level.hpp"
-#include "solve/pose_search.hpp"
+#include "solve/pose_fit.hpp"
 
 namespace dpr {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "dpr/pose_tracker.hpp"
+#include "solve/extent.hpp"
 #include "solve/pose_level.hpp"
-#include "solve/pose_window.hpp"
 #include "support/messages.hpp"
 #include "support/reduced.hpp"
 #include "support/rigid_image.hpp"

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "dpr/error.hpp"
+#include "solve/extent.hpp"
 #include "solve/polar.hpp"
 #include "solve/pose_window.hpp"
 #include "support/messages.hpp"
@@ -136,7 +138,71 @@ TEST_SUITE("unit") {
   }
 }
 
+TEST_SUITE("unit") {
+  TEST_CASE("what differs from the background is found in noise, and nothing where nothing does") {
+    std::mt19937 random(7);
+    std::normal_distribution<float> noise(0, 0.08F);
+    Image picture(90, 70);
+    for (glm::vec4& pixel : picture.pixels)
+      pixel = {0.2F + noise(random), 0.3F + noise(random), 0.1F + noise(random), 1};
+    CHECK_FALSE(extent_before(picture, glm::vec3(0.2F, 0.3F, 0.1F)));
+    for (int row = 20; row < 32; ++row) {
+      for (int column = 50; column < 73; ++column) picture.at(column, row).y += 0.4F;
+    }
+    const auto box = extent_before(picture, glm::vec3(0.2F, 0.3F, 0.1F));
+    REQUIRE(box);
+    CHECK(std::abs(box->x - 50) <= 1);
+    CHECK(std::abs(box->y - 20) <= 1);
+    CHECK(std::abs(box->width - 23) <= 2);
+    CHECK(std::abs(box->height - 12) <= 2);
+    CHECK_FALSE(extent_before(Image(90, 70, glm::vec4(0.5F)), glm::vec3(0.5F)));
+  }
+}
+
 TEST_SUITE("pipeline") {
+  TEST_CASE("search: where an object shows whole before the background no other place is tried") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    Scene scene = cube_scene();
+    const auto search = [&](const Image& target) {
+      return PoseSolver(device, scene, target, {.method = LeastSquares{}, .solve_translation = true})
+          .search();
+    };
+    const Pose truth = moved(scene, {1.1, 0.3, -1.5});
+    Image target = test::rigid_image(device, with(scene, truth));
+    const PoseResult alone = search(target);
+    check_found(alone, truth);
+    constexpr unsigned k_of_box = 97;  // the best rotations, and the initial one
+    CHECK(alone.history.front().hypotheses == k_of_box);
+
+    for (int i = 0; i < 9; ++i) target.at(3 + i % 3, 75 + i / 3) = glm::vec4(1);
+    check_found(search(target), truth);  // a speck is nothing
+
+    scene.meshes.push_back({make_cube(), affine(glm::dmat3(0.6), glm::dvec3(0, -3, 0))});
+    const Image two = test::rigid_image(device, with(scene, truth));
+    scene.meshes.pop_back();
+    const PoseResult beside = search(two);  // no cube fills the box of both
+    CHECK(angle_degrees(beside.pose.rotation, truth.rotation) < 0.5);
+    CHECK(beside.history.size() > alone.history.size());
+    for (std::size_t i = 0; i < beside.history.size(); ++i) CHECK(beside.history[i].iteration == i);
+  }
+
+  TEST_CASE("search: an object that the picture cuts is found") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = cube_scene();
+    const Pose truth = moved(scene, {2.5, 0.2, 0.3});
+    const Image target = test::rigid_image(device, with(scene, truth));
+    const PoseBox seen = *extent(mask_of(target));
+    CHECK(seen.x + seen.width == 96);
+    CHECK(seen.width < 0.7F * seen.height);
+    const PoseOptions options{.method = LeastSquares{}, .solve_translation = true};
+    const PoseResult result = PoseSolver(device, scene, target, options).search();
+    CHECK(result.explained);
+    CHECK(angle_degrees(result.pose.rotation, truth.rotation) < 2);
+    CHECK(glm::length(result.pose.translation - truth.translation) < 0.05 * k_radius);
+  }
+
   TEST_CASE("search: an object of unknown place is found in a box, a mask, a silhouette or anywhere") {
     if (test::is_reduced()) return;
     const Device device = open_device();
