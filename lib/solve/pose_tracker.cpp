@@ -10,10 +10,10 @@
 
 #include "base/checks.hpp"
 #include "solve/pose_beam.hpp"
+#include "solve/pose_fit.hpp"
 #include "solve/pose_motion.hpp"
 #include "solve/pose_pivot.hpp"
 #include "solve/pose_pyramid.hpp"
-#include "solve/pose_fit.hpp"
 #include "solve/resample.hpp"
 #include "solve/track_levels.hpp"
 #include "solve/track_starts.hpp"
@@ -175,13 +175,17 @@ TrackedPose PoseTracker::Impl::track(const TrackFrame& frame) {
 
 /// A frame before the object was seen at all.
 TrackedPose PoseTracker::Impl::first(const TrackFrame& frame) {
-  const bool anywhere = (options.search || misses > 0) && is_due();
-  LeastSquares method = observing(options.method, frame);
-  if (!anywhere) method.rotations = 0;
-  PoseOptions single = pose_options(options);
-  single.method = std::move(method);
-  const Foreknowledge known = anywhere ? Foreknowledge::place : Foreknowledge::start;
-  FittedPose fitted = fit_pose(device, pivot.scene(), frame.image, single, {&start, 1}, known, {});
+  const auto fit = [&](bool anywhere) {
+    LeastSquares method = observing(options.method, frame);
+    if (!anywhere) method.rotations = 0;
+    PoseOptions single = pose_options(options);
+    single.method = std::move(method);
+    const Foreknowledge known = anywhere ? Foreknowledge::place : Foreknowledge::start;
+    return fit_pose(device, pivot.scene(), frame.image, single, {&start, 1}, known, {});
+  };
+  const bool is_unknown = options.search || misses > 0;
+  FittedPose fitted = fit(is_unknown && is_due());
+  if (!fitted.result.explained && !is_unknown && is_due()) fitted = fit(true);
   if (!fitted.result.explained) {
     ++misses;
     return {.pose = pivot.to_origin(start), .loss = fitted.result.loss};

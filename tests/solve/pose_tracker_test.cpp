@@ -216,6 +216,20 @@ TEST_SUITE("pipeline") {
     CHECK(angle_degrees(found.pose.rotation, truth.rotation) < 0.8);
   }
 
+  TEST_CASE("tracker: where the first rotation is wrong the first frame is searched everywhere") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = body_scene(96, 3);
+    Film film(device, scene);
+    const Pose truth{rotation_from_vector({-0.5, 2, 1}), glm::dvec3(0.1, -0.2, 0)};
+    TrackOptions options = near_start();
+    const TrackedPose found = PoseTracker(device, scene, options).track(film.at(truth));
+    CHECK(found.status == TrackStatus::found);
+    CHECK(angle_degrees(found.pose.rotation, truth.rotation) < 0.8);
+    options.search_interval = 0;
+    CHECK(PoseTracker(device, scene, options).track(film.at(truth)).status == TrackStatus::lost);
+  }
+
   TEST_CASE("tracker: depths hold an object before surroundings that are not known") {
     if (test::is_reduced()) return;
     const Device device = open_device();
