@@ -152,11 +152,15 @@ BopImage begin_bop(const CLI::App& command, PoseCommandOptions& options) {
 
 bool writes_csv(const PoseCommandOptions& options) { return lower_case_extension(options.output) == ".csv"; }
 
-void check_scene_options(const PoseCommandOptions& options) {
+void check_scene_options(const CLI::App& command, const PoseCommandOptions& options) {
   if (options.scene.empty() == options.bop.folder.empty()) {
     throw InvalidArgument("--scene (command line)", options.scene.empty() ? "none" : "one beside --bop",
                           "a scene file, or a folder of BOP's with --bop");
   }
+  for (const char* const of_bop : {"--image", "--object", "--models"})
+    if (options.bop.folder.empty() && command.count(of_bop) > 0)
+      throw InvalidArgument(std::string(of_bop) + " (command line)", "no --bop",
+                            "the folder of its data set");
   if (!writes_csv(options)) return;
   if (options.bop.folder.empty())
     throw InvalidArgument("--output (command line)", "a .csv without --bop", "a .json file");
@@ -235,7 +239,7 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   // The outputs are checked before the work.
   require_writable(options.output);
-  check_scene_options(options);
+  check_scene_options(command, options);
   if (!options.views.empty()) return run_views(command, options, common);
   if (options.moving)
     throw InvalidArgument("--moving (command line)", "one without --views", "--views, which names pictures");
@@ -365,12 +369,11 @@ void add_pose_command(CLI::App& application, CommonOptions& common) {
               "nearest to it is the result")
           ->type_name("RX,RY,RZ");
   command
-      ->add_flag("--search", options->search,
-                 "Nothing is known of the rotation, nor with --translation of the place: the object may be "
-                 "anywhere in the "
-                 "picture, at half to twice the distance of the scene's, or with --box, --silhouette or "
-                 "--mask where "
-                 "it fills these")
+      ->add_flag(
+          "--search", options->search,
+          "Nothing is known of the rotation, nor with --translation of the place: the object may be "
+          "anywhere in the picture, where it differs from the scene's background first, at half to twice "
+          "the distance of the scene's, or with --box, --silhouette or --mask where it fills these")
       ->excludes(initial);
   command->add_flag("--translation", options->solver.solve_translation, "Look for the translation too");
   command->add_option("--method", options->method, "Method that finds the pose; least_squares by default")

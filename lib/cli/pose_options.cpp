@@ -55,13 +55,20 @@ void add_observation_weights(CLI::App& command, const char* group, LeastSquares&
       "Factor on the weight that the residuals give silhouettes, their inverse variance; 1 by default");
   add("--depth-scale", depth_scale,
       "Length of a 1 of depth files, in the scene's units: 0.001 for 16-bit PNGs of millimetres and a scene "
-      "in "
-      "metres; files of whole numbers need one");
+      "in metres; files of whole numbers need one");
   add("--depth-weight", method.depth.weight,
       "Factor on the weight that the residuals give depths; 1 by default");
 }
 
 LeastSquares read_least_squares(const CLI::App& command, const LeastSquaresOptions& options) {
+  const auto is_given = [&](const std::string& name) {
+    const CLI::Option* const option = command.get_option_no_throw(name);
+    return option != nullptr && option->count() > 0;
+  };
+  for (const std::string image : {"--silhouette", "--depth"}) {
+    if (is_given(image + "-weight") && !is_given(image) && !is_given("--views"))
+      throw InvalidArgument(image + "-weight (command line)", "no " + image, "the images that it weighs");
+  }
   LeastSquares method = options.method;
   method.robust = command.count("--robust") > 0 || method.unknown_background;
   method.light = static_cast<PoseLight>(position_of(options.light, light_names(), "--light (command line)"));

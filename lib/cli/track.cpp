@@ -206,8 +206,7 @@ void add_tracking_options(CLI::App& command, TrackOptions& tracker) {
       "Part of the motion between two frames that is expected again, in [0, 1]; 0.9 by default", "FLOAT");
   add("--explained", tracker.explained,
       "A frame counts as explained below that part of what is left without the object, or below its square "
-      "root "
-      "with --robust; more lets more of the object be hidden; 0.1 by default",
+      "root with --robust; more lets more of the object be hidden; 0.1 by default",
       "FLOAT");
   add("--search-interval", tracker.search_interval,
       "A lost object is looked for about its last place in every frame, and everywhere in the first and "

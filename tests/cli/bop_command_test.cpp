@@ -125,6 +125,7 @@ TEST_SUITE("robustness") {
       CHECK(contains(outcome.err, says));
     };
     check("-o p.json --target t.png", "--scene (command line): got none");
+    check("--scene s.json --target t.png --object 5 -o p.json", "--object (command line): got no --bop");
     check("--bop data/test/000002 --image 3 -o p.json", "--object (command line): got none");
     check("--bop data/test/000002 --image 4 --object 5 -o p.json", "scene_camera.json): got no key \"4\"");
     check("--bop data/test/000002 --image 3 --object 2 -o p.json", "got no object 2, expected one of 1, 5");

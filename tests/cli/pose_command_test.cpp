@@ -399,6 +399,7 @@ TEST_SUITE("robustness") {
     check("--silhouette missing.png", "missing.png: the file does not exist");
     check("--silhouette small.png", "size of --silhouette small.png (command line): got 3x2, expected 64x48");
     check("--silhouette black.png", "sum of the silhouette (pose): got 0");
+    check("--depth-weight 2", "--depth-weight (command line): got no --depth");
     check("--depth small.png --depth-scale 1", "size of --depth small.png (command line): got 3x2");
     check("--depth black.png", "--depth black.png (command line): got whole numbers, expected --depth-scale");
     check("--depth black.exr", "--depth (command line): got no pixel that has one");
