@@ -67,6 +67,7 @@ class Fit {
   /// Refines all candidates at a level and keeps the best distinct ones.
   void work(PoseLevel& level, std::size_t keep);
   void try_half_turns(PoseLevel& level);
+  void try_wider(PoseLevel& level);
   double enough() const { return enough_to_equal(candidates_.front().equations.loss, wrong_); }
   void finish(PoseLevel& level);
   void choose_equals();
@@ -110,6 +111,7 @@ FittedPose Fit::run() {
   drop_hopeless_at(level, candidates_, 0, k_last_hope, wrong_);
   work(level, beam_.back());
   if (method_.rotations > 0) try_half_turns(level);
+  if (method_.robust && has_colors_) try_wider(level);
   // A wrong pose leaves as much in a pixel's sample as in the mean over its area, which is dear.
   PoseLevel sampled = make_level(shapes.back(), light_);
   sampled.set_scales(level.scales());
@@ -186,6 +188,24 @@ void Fit::try_half_turns(PoseLevel& level) {
   add_half_turns(candidates_, half_turns_, 1);
   drop_hopeless_at(level, candidates_, own, k_hope, wrong_);
   if (candidates_.size() > own) work(level, beam_.back());
+}
+
+/// The best pose once more, from where a wide robust loss leads it: the last one sees nothing of edges that are not yet
+/// aligned.
+void Fit::try_wider(PoseLevel& level) {
+  constexpr float k_wider = 12;
+  if (!goes_on_) return;
+  const auto go_on = [] { return true; };
+  const std::vector<LossScales> scales = level.scales();
+  const Turns turns{method_.iterations, k_patience * method_.iterations};
+  std::vector<Candidate> wide{{candidates_.front().hypothesis}};
+  level.set_color_scale(k_wider * level.color_scale());
+  refine(level, space_, wide, turns, go_on);
+  level.set_scales(scales);
+  wide.front().restart();
+  refine(level, space_, wide, turns, go_on);
+  candidates_.push_back({wide.front().hypothesis});
+  refine_distinct(level, space_, candidates_, {0, beam_.back(), wrong_}, go_on);
 }
 
 PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
