@@ -67,7 +67,7 @@ FittedPose search_picture(const Device& device, const PoseProblem& picture, std:
     goes_on = !callback || callback(step);
     return goes_on;
   };
-  FittedPose fitted;
+  std::optional<FittedPose> fitted;
   if (const std::optional<PoseBox> extent = whole_extent(picture)) {
     PoseProblem boxed = picture;
     auto& method = std::get<LeastSquares>(boxed.options.method);
@@ -76,12 +76,12 @@ FittedPose search_picture(const Device& device, const PoseProblem& picture, std:
         std::max(1U, method.coarsest * 3 / 4);  // the object fills two thirds of its box and the margin
     fitted = fit_in_box(device, boxed, *extent, initial, Foreknowledge::place, report);
   }
-  if (!fitted.result.explained && goes_on) {
+  if (!fitted || (!fitted->result.explained && goes_on)) {
     FittedPose other = fit_about_middle(device, {&picture, 1}, initial, Foreknowledge::place, report);
-    if (other.result.unexplained_part <= fitted.result.unexplained_part) fitted = std::move(other);
+    if (!fitted || other.result.unexplained_part < fitted->result.unexplained_part) fitted = std::move(other);
   }
-  fitted.result.history = std::move(history);
-  return fitted;
+  fitted->result.history = std::move(history);
+  return *std::move(fitted);
 }
 
 }  // namespace

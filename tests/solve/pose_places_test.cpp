@@ -187,6 +187,21 @@ TEST_SUITE("pipeline") {
     for (std::size_t i = 0; i < beside.history.size(); ++i) CHECK(beside.history[i].iteration == i);
   }
 
+  TEST_CASE("search: a picture that every pose makes worse has a pose that does not explain it") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    const Scene scene = cube_scene();
+    Image grey(scene.width, scene.height, glm::vec4(0.5F, 0.5F, 0.5F, 1));
+    for (std::size_t i = 0; i < grey.pixels.size(); ++i) grey.pixels[i].x += i % 7 == 0 ? 0.01F : 0;
+    const PoseResult result =
+        PoseSolver(device, scene, grey, {.method = LeastSquares{}, .solve_translation = true}).search();
+    CHECK_FALSE(result.explained);
+    CHECK(result.unexplained_part > 1);
+    REQUIRE_FALSE(result.equals.empty());
+    CHECK(result.equals.front().loss == result.loss);
+    CHECK(glm::length(result.pose.translation - result.equals.front().pose.translation) == 0);
+  }
+
   TEST_CASE("search: an object that the picture cuts is found") {
     if (test::is_reduced()) return;
     const Device device = open_device();

@@ -9,10 +9,9 @@
 `pictures` path-traces meshes in unknown light with Mitsuba 3 (see foreign.py) and spoils them as cameras do: noise,
 blur, JPEG, clutter behind and something in front. `photographs` makes a board of coloured faces for each photograph
 of a chessboard, with the truth of OpenCV's calibration. Both write cases: NAME.json is the scene, NAME.png or .jpg
-the target, NAME.case the true pose. `poses` starts near the truth and compares errors with claimed deviations;
-then it starts half a turn away, where wrong poses come out, to see which are called explained. `together` finds the
-photographs' poses and their camera in one run, from poses 20 degrees and a tenth of the distance off, with the right
-camera, with a focal length a tenth too long, and with that and no lens.
+the target, NAME.case the true pose. `poses` starts near the truth and compares errors with claimed deviations; then half
+a turn away, where wrong poses come out, to see which are called explained. `together` finds the photographs' poses and
+camera in one run, from 20 degrees and a tenth of the distance off, with the right camera, one a tenth too long, and no lens.
 """
 import argparse
 import io
@@ -102,18 +101,14 @@ def save(path, linear, quality):
     """As sRGB: PNG, or JPEG of a quality."""
     from PIL import Image
     image = Image.fromarray(np.round(255 * encoded(linear)).astype(np.uint8))
-    if quality:
-        image.save(path.with_suffix(".jpg"), quality=quality)
-    else:
-        image.save(path.with_suffix(".png"))
+    image.save(path.with_suffix(".jpg" if quality else ".png"), **({"quality": quality} if quality else {}))
 
 
 def add_clutter(random, image, coverage):
     return image + (1 - coverage) * smooth_noise(random, *image.shape[:2], int(random.integers(12, 40)))
 
 
-def hide(random, image, coverage, least, most):
-    """Part of the object, between these, by a square of one colour."""
+def hide(random, image, coverage, least, most):  # part of the object, by a square of one colour
     rows, columns = np.nonzero(coverage[..., 0] > 0.5)
     i = random.integers(len(rows))
     side = int(np.sqrt(len(rows) * random.uniform(least, most)))
