@@ -11,7 +11,7 @@ blur, JPEG, clutter behind and something in front. `photographs` makes a board o
 of a chessboard, with the truth of OpenCV's calibration. Both write cases: NAME.json is the scene, NAME.png or .jpg
 the target, NAME.case the true pose. `poses` starts near the truth and compares errors with claimed deviations; then half
 a turn away, where wrong poses come out, to see which are called explained. `together` finds the photographs' poses and
-camera in one run, from 20 degrees and a tenth of the distance off, with the right camera, one a tenth too long, and no lens.
+camera from 20 degrees and a tenth of the distance off, with the focal length right, a tenth too long, and without a lens.
 """
 import argparse
 import io
