@@ -15,14 +15,12 @@ import json
 import pathlib
 import resource
 import statistics
-import subprocess
-import tempfile
 
 import numpy as np
 
-from foreign import angle_degrees, path_trace, uniform_rotation
+from foreign import path_trace, picture_of, run_pose, uniform_rotation
 from uncertainty import add_clutter, affine, blurred, hide, mug, save, turn
-from unmasked import projected_box
+from unmasked import errors_of, projected_box
 
 BOX = ["--box", "--unknown-background"]
 CONDITIONS = {  # and what a user adds to `--search --translation`
@@ -186,20 +184,11 @@ def make_pictures(arguments):
 
 def find_pose(arguments, path, scene, case, options):
     """Errors of `dpr pose`, and the seconds its process and its children took of all processors."""
-    target = next(path.with_suffix(suffix) for suffix in (".png", ".jpg") if path.with_suffix(suffix).exists())
-    with tempfile.TemporaryDirectory() as folder:
-        scene_file, output = pathlib.Path(folder) / "scene.json", pathlib.Path(folder) / "pose.json"
-        scene_file.write_text(json.dumps(scene))
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        words = [arguments.dpr, "pose", "--scene", scene_file, "--target", target, "--translation", "--quiet", "-o", output]
-        subprocess.run([str(word) for word in [*words, *options, *arguments.options.split()]], check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        pose = json.loads(output.read_text())
-    points, found = np.array(scene["meshes"][0]["positions"]), np.array(pose["rotation_matrix"])
-    middle = (points.min(0) + points.max(0)) / 2
-    off = (found - case["rotation"]) @ middle + pose["translation"] - case["translation"]
-    return {"case": path.stem, "degrees": angle_degrees(found, case["rotation"]), "off": float(np.linalg.norm(off)),
-            "explained": pose["explained"], "unexplained_part": pose["unexplained_part"],
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    pose = run_pose(arguments, scene, picture_of(path), "--translation", *options)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    points = np.array(scene["meshes"][0]["positions"])
+    return {"case": path.stem, **errors_of(pose, case, (points.min(0) + points.max(0)) / 2),
             "cpu_seconds": after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime}
 
 

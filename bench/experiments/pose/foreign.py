@@ -118,12 +118,20 @@ def angle_degrees(a, b):
     return float(np.degrees(np.arccos(np.clip((np.trace(np.array(a).T @ np.array(b)) - 1) / 2, -1, 1))))
 
 
-def find_pose(arguments, folder, stem, view):
-    output = pathlib.Path(folder) / "pose.json"
-    command = [arguments.dpr, "pose", "--scene", arguments.folder / f"{stem}.json", "--target",
-               arguments.folder / f"{stem}{view:02}.exr", "--search", "--quiet", "-o", output, *arguments.options.split()]
-    subprocess.run([str(word) for word in command], check=True)
-    return json.loads(output.read_text())
+def picture_of(file):
+    """The picture beside a file, of the same name."""
+    return next(file.with_suffix(suffix) for suffix in (".png", ".jpg", ".exr") if file.with_suffix(suffix).exists())
+
+
+def run_pose(arguments, scene, target, *options):
+    """What `dpr pose` finds in a picture of a scene."""
+    with tempfile.TemporaryDirectory() as folder:
+        scene_file, output = pathlib.Path(folder) / "scene.json", pathlib.Path(folder) / "pose.json"
+        scene_file.write_text(json.dumps(scene))
+        command = [arguments.dpr, "pose", "--scene", scene_file, "--target", target, "--quiet", "-o", output,
+                   *options, *arguments.options.split()]
+        subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
+        return json.loads(output.read_text())
 
 
 def summary(rows):
@@ -135,15 +143,13 @@ def summary(rows):
 
 def find_poses(arguments):
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for truth_file in sorted(arguments.folder.glob("*.truth")):
-            stem = truth_file.stem
-            for view, truth in enumerate(json.loads(truth_file.read_text())[:arguments.count]):
-                pose = find_pose(arguments, folder, stem, view)
-                rows.append({"mesh": stem, "view": view,
-                             "angle_error_degrees": angle_degrees(pose["rotation_matrix"], truth),
-                             "explained": pose["explained"], "loss": pose["loss"], "seconds": pose["seconds"]})
-            print(stem, summary([row for row in rows if row["mesh"] == stem]), flush=True)
+    for truth_file in sorted(arguments.folder.glob("*.truth")):
+        stem, scene = truth_file.stem, json.loads(truth_file.with_suffix(".json").read_text())
+        for view, truth in enumerate(json.loads(truth_file.read_text())[:arguments.count]):
+            pose = run_pose(arguments, scene, arguments.folder / f"{stem}{view:02}.exr", "--search")
+            rows.append({"mesh": stem, "view": view, "angle_error_degrees": angle_degrees(pose["rotation_matrix"], truth),
+                         "explained": pose["explained"], "loss": pose["loss"], "seconds": pose["seconds"]})
+        print(stem, summary([row for row in rows if row["mesh"] == stem]), flush=True)
     result = {"schema": 1, "options": arguments.options, "all": summary(rows),
               "meshes": {name: summary([row for row in rows if row["mesh"] == name])
                          for name in sorted({row["mesh"] for row in rows})}, "poses": rows}

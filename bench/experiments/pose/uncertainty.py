@@ -22,7 +22,7 @@ import tempfile
 
 import numpy as np
 
-from foreign import angle_degrees, path_trace, uniform_rotation
+from foreign import angle_degrees, path_trace, picture_of, run_pose, uniform_rotation
 
 
 def turn(vector):
@@ -247,14 +247,7 @@ def find_pose(arguments, case, scene_file, rotation, translation):
     """Of `dpr pose` from there."""
     scene = json.loads(scene_file.read_text())
     scene["meshes"][0]["transform"] = affine(rotation, translation).tolist()
-    target = next(scene_file.with_suffix(suffix) for suffix in (".png", ".jpg", ".exr") if scene_file.with_suffix(suffix).exists())
-    with tempfile.TemporaryDirectory() as folder:
-        start, output = pathlib.Path(folder) / "start.json", pathlib.Path(folder) / "pose.json"
-        start.write_text(json.dumps(scene))
-        words = [arguments.dpr, "pose", "--scene", start, "--target", target, "--rotations", "0", "--quiet", "-o", output,
-                 *case["options"], *arguments.options.split()]
-        subprocess.run([str(word) for word in words], check=True, stdout=subprocess.DEVNULL)
-        return json.loads(output.read_text())
+    return run_pose(arguments, scene, picture_of(scene_file), "--rotations", "0", *case["options"])
 
 
 def half_turns(scene):

@@ -8,12 +8,10 @@ object is given instead of a mask. Starts are some degrees and a tenth of the di
 import argparse
 import json
 import pathlib
-import subprocess
-import tempfile
 
 import numpy as np
 
-from foreign import angle_degrees
+from foreign import angle_degrees, picture_of, run_pose
 from uncertainty import affine, turn
 
 
@@ -31,9 +29,16 @@ def projected_box(scene, points):
     return *corners.min(0), *np.abs(corners[1] - corners[0])
 
 
+def errors_of(pose, case, middle):
+    """Of a pose, at the middle of the object, and what is said of it."""
+    found = np.array(pose["rotation_matrix"])
+    off = (found - case["rotation"]) @ middle + pose["translation"] - case["translation"]
+    return {"degrees": float(angle_degrees(found, case["rotation"])), "off": float(np.linalg.norm(off)),
+            "explained": pose["explained"], "unexplained_part": pose["unexplained_part"]}
+
+
 def find_pose(arguments, file):
     case, scene = json.loads(file.read_text()), json.loads(file.with_suffix(".json").read_text())
-    target = next(file.with_suffix(suffix) for suffix in (".png", ".jpg") if file.with_suffix(suffix).exists())
     mask, random = file.with_suffix(".mask.png"), np.random.default_rng([*file.stem.encode(), arguments.degrees])
     points, rotation, place = np.array(scene["meshes"][0]["positions"]), np.array(case["rotation"]), case["translation"]
     middle, view = (points.min(0) + points.max(0)) / 2, np.array(scene["camera"]["view"])
@@ -44,16 +49,8 @@ def find_pose(arguments, file):
     scene["meshes"][0]["transform"] = affine(start, there - start @ middle).tolist()
     box = mask_box(mask) if mask.exists() else projected_box(scene, points @ rotation.T + place)
     options = case["options"][:case["options"].index("--mask")] if mask.exists() else case["options"]
-    with tempfile.TemporaryDirectory() as folder:
-        scene_file, output = pathlib.Path(folder) / "scene.json", pathlib.Path(folder) / "pose.json"
-        scene_file.write_text(json.dumps(scene))
-        subprocess.run([arguments.dpr, "pose", "--scene", scene_file, "--target", target, *options, *arguments.options.split(),
-                        "--box", ",".join(f"{side:.1f}" for side in box), "--quiet", "-o", output], check=True)
-        pose = json.loads(output.read_text())
-    found = np.array(pose["rotation_matrix"])
-    off = (found - rotation) @ middle + pose["translation"] - place
-    return {"case": file.stem, "degrees": float(angle_degrees(found, rotation)), "off": float(np.linalg.norm(off)),
-            "explained": pose["explained"], "unexplained_part": pose["unexplained_part"], "seconds": pose["seconds"]}
+    pose = run_pose(arguments, scene, picture_of(file), *options, "--box", ",".join(f"{side:.1f}" for side in box))
+    return {"case": file.stem, **errors_of(pose, case, middle), "seconds": pose["seconds"]}
 
 
 def main():
