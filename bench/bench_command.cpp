@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "cli/completion.hpp"
+#include "cli/file_options.hpp"
 #include "compare.hpp"
 #include "device_ranking.hpp"
 #include "dpr/error.hpp"
@@ -37,6 +38,7 @@ void run_report(const BenchOptions& options, const CommonOptions& common) {
   }
   std::vector<Json> results;
   for (const std::string& file : options.files) results.push_back(bench::read_results(file));
+  require_outputs({}, options.report);
   for (const std::string& picture : bench::write_report(options.report, results, common.command_line)) {
     if (!common.quiet) std::printf("%s\n", picture.c_str());
   }

@@ -12,6 +12,7 @@
 #include <string>
 #include <system_error>
 
+#include "base/input_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr {
@@ -57,6 +58,8 @@ std::optional<Status> find(const std::filesystem::path& file) {
   if (S_ISBLK(status.st_mode) || S_ISSOCK(status.st_mode)) {
     throw IoError(file, "cannot be written: neither a file, nor a FIFO or a character device");
   }
+  if (const auto input = guarded_input(file))
+    throw IoError(file, "cannot be written: it is the file that is read as " + input->string());
   if (faccessat(AT_FDCWD, file.c_str(), W_OK, AT_EACCESS) != 0) cannot_write(file, errno);
   return status;
 }

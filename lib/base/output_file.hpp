@@ -15,7 +15,7 @@ namespace dpr {
 /// A file on its way to its name. What is written goes to a temporary file beside it, which commit() stores
 /// on the disk and renames; without commit(), what was there stays. Links are followed: the file at their end
 /// is replaced. A file that is replaced leaves its mode to the new one, and its owner where the process may
-/// give it. A character device or a FIFO is written to directly.
+/// give it. A character device or a FIFO is written to directly. Guarded inputs (guard_inputs()) are not replaced.
 class OutputFile {
  public:
   /// Throws IoError where the file cannot be written. Waits for the reader of a FIFO.

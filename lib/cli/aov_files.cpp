@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 
@@ -44,7 +43,6 @@ Image grey(const std::vector<float>& values, const Scene& scene) {
 AovFiles::AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene)
     : output_(output) {
   for (const std::string& name : names) {
-    require_writable(file_name(name));
     if (name == k_standard_error) {
       standard_error_ = true;
     } else if (name == k_gradient_standard_error) {
@@ -59,6 +57,14 @@ AovFiles::AovFiles(const std::vector<std::string>& names, const std::string& out
     throw InvalidArgument("uv (--aov)", "mesh " + std::to_string(i) + ", which has no texture coordinates",
                           "meshes that have some, as OBJ files with vt");
   }
+}
+
+std::vector<std::filesystem::path> AovFiles::files() const {
+  std::vector<std::filesystem::path> files;
+  for (const Aov aov : aovs_) files.emplace_back(file_name(to_string(aov)));
+  if (standard_error_) files.emplace_back(file_name(k_standard_error));
+  if (gradient_standard_error_) files.emplace_back(file_name(k_gradient_standard_error));
+  return files;
 }
 
 std::string AovFiles::file_name(std::string_view name) const {

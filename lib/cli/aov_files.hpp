@@ -1,6 +1,7 @@
 // The auxiliary outputs of `dpr render --aov`.
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,8 +17,11 @@ class AovFiles {
   /// Throws InvalidArgument for a word that names none, and for uv of a scene without texture coordinates.
   AovFiles(const std::vector<std::string>& names, const std::string& output, const Scene& scene);
 
-  /// Writes them, from the last forward() of a renderer that draws `drawn`, to OUT.NAME.exr for the output
-  /// OUT.png: these files. Faces and barycentrics are the scene's.
+  /// Those that write() makes: OUT.NAME.exr for the output OUT.png.
+  std::vector<std::filesystem::path> files() const;
+
+  /// Writes them, from the last forward() of a renderer that draws `drawn`. Returns files(). Faces and barycentrics
+  /// are the scene's.
   std::vector<std::string> write(Renderer& renderer, const Scene& scene, const SubdividedScene& drawn) const;
   /// A line on the standard error of the image, if the scene is sampled.
   void print_sampling_error(Renderer& renderer) const;

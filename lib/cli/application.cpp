@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/input_file.hpp"
 #include "base/name_list.hpp"
 #include "cli/completion.hpp"
 #include "cli/file_options.hpp"
@@ -225,6 +226,7 @@ int run(CLI::App& application, int argc, char** argv) {
 
 int run_application(CLI::App& application, CommonOptions& common, int argc, char** argv) {
   prepare_process();
+  guard_inputs();
   common.command_line = command_line(application, argc, argv);
   try {
     const int status = run(application, argc, argv);

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "base/input_file.hpp"
+#include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
 namespace dpr::cli {
@@ -44,6 +46,24 @@ void require_files_apart(const CLI::App& command) {
 void refuse_shared_files(CLI::App& command) {
   command.parse_complete_callback([&command] { require_files_apart(command); });
   for (CLI::App* other : command.get_subcommands({})) refuse_shared_files(*other);
+}
+
+void require_outputs(const std::vector<std::filesystem::path>& files, const std::string& report) {
+  for (auto file = files.begin(); file != files.end(); ++file) {
+    require_writable(*file);
+    const auto other =
+        std::find_if(files.begin(), file, [&](const auto& f) { return are_one_file(f, *file); });
+    if (other != file) {
+      throw InvalidArgument("outputs (command line)",
+                            "\"" + other->string() + "\" and \"" + file->string() + "\"",
+                            "different files; OBJ has its materials and textures beside it");
+    }
+  }
+  if (const auto input = report.empty() ? std::nullopt : guarded_input_in(report)) {
+    throw InvalidArgument("--report (command line)",
+                          "\"" + report + "\", where " + input->string() + " is read",
+                          "a folder without inputs");
+  }
 }
 
 }  // namespace dpr::cli

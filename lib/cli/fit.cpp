@@ -10,8 +10,8 @@
 #include "base/checks.hpp"
 #include "base/clock.hpp"
 #include "base/input_file.hpp"
-#include "base/output_file.hpp"
 #include "cli/commands.hpp"
+#include "cli/file_options.hpp"
 #include "cli/fit_explained.hpp"
 #include "cli/fit_report.hpp"
 #include "cli/option_names.hpp"
@@ -21,6 +21,7 @@
 #include "cli/views_file.hpp"
 #include "dpr/error.hpp"
 #include "dpr/photographs.hpp"
+#include "mesh/mesh_reader.hpp"
 #include "mesh/texture_atlas.hpp"
 #include "scene/scene_json.hpp"
 #include "solve/resample.hpp"
@@ -74,8 +75,7 @@ ShapeViews read_views(const CLI::App& command, const std::string& text, const Fi
   if (std::ranges::none_of(views.views, &ShapeView::has_alpha)) {
     notes.push_back(
         "no image says where the object is, so colours alone are compared and thin parts may be lost: images "
-        "with "
-        "alpha, or \"silhouette\" in the views file, find them");
+        "with alpha, or \"silhouette\" in the views file, find them");
   }
   print_notes(notes, common);
   if (common.size) resize(views, parse_size(*common.size));
@@ -101,8 +101,7 @@ void require_measured(const CLI::App& command, const char* name, float weight, c
                         "an image of one beside every view's, in the views file");
 }
 
-/// Checks the outputs before the work.
-void check_outputs(const FitCommandOptions& options) {
+void check_output_format(const FitCommandOptions& options) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".obj" && extension != ".ply" && extension != ".glb") {
     throw InvalidArgument("--output (command line)", "\"" + options.output + "\"",
@@ -111,10 +110,15 @@ void check_outputs(const FitCommandOptions& options) {
   if (options.texture && extension == ".ply")
     throw InvalidArgument("--texture (command line)", "an output .ply, which holds no texture",
                           "a file .obj or .glb");
-  require_writable(options.output);
+}
+
+/// Checks the outputs before the work.
+void check_outputs(const FitCommandOptions& options) {
+  std::vector<std::filesystem::path> files = written_files(options.output, options.texture ? 1 : 0);
   for (const std::string& file : {options.checkpoint, options.saved_views}) {
-    if (!file.empty()) require_writable(file);
+    if (!file.empty()) files.emplace_back(file);
   }
+  require_outputs(files, options.report);
 }
 
 /// Finds the cameras of the views that have none. Reports unlikely results.
@@ -206,13 +210,14 @@ ShapeTexture write_textured(const FitCommandOptions& options, const std::vector<
 }
 
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
-  check_outputs(options);
+  check_output_format(options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   const std::string text = read_file(options.views);
   ShapeViews views = read_views(command, text, options, common);
   require_measured(command, "--depth", options.solver.depth, views, &ShapeView::depth, "depth");
   require_measured(command, "--normal", options.solver.normal, views, &ShapeView::normal, "normal");
+  check_outputs(options);
   const std::vector<Device> devices = open_devices(common);
   complete_photographs(command, options, devices.front(), views, common);
   const ShapeSolver solver = with_option_names(command, {{"edge_pixels", "--edge"}},

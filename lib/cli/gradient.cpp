@@ -6,8 +6,8 @@
 
 #include "base/checks.hpp"
 #include "base/name_list.hpp"
-#include "base/output_file.hpp"
 #include "cli/commands.hpp"
+#include "cli/file_options.hpp"
 #include "cli/json.hpp"
 #include "cli/lens_options.hpp"
 #include "cli/target.hpp"
@@ -75,11 +75,11 @@ Json gradient_to_json(const Scene& scene, double loss, SceneGradient gradient) {
 }
 
 void run(const CLI::App& command, const GradientOptions& options, const CommonOptions& common) {
-  require_writable(options.output);
   const Scene scene = read_scene(options.scene, common);
   const SubdividedScene drawn = subdivide(command, scene, options.lens);
   const LossWeights weights = LossWeights::only(parse_loss(options.loss, "--loss"));
   const Image target = read_target(options.target, weights, common.encoding(), scene);
+  require_outputs({options.output});
   const Device device = open_device(common);
   Renderer renderer(device);
   ImageLoss image_loss(device, weights, {&target, 1});

@@ -10,6 +10,7 @@
 #include "base/output_file.hpp"
 #include "cli/bop.hpp"
 #include "cli/commands.hpp"
+#include "cli/file_options.hpp"
 #include "cli/moving_meshes.hpp"
 #include "cli/option_names.hpp"
 #include "cli/picture_camera.hpp"
@@ -229,6 +230,7 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
   }
   choose_method(command, options);
   const SceneOfViews in = read_scene_of_views(options.scene, options.views, common);
+  require_outputs({options.output}, options.report);
   with_option_names(command, k_least_squares_names, [&] {
     find_poses_in_views({options.views, options.output, options.report, options.meshes, options.moving,
                          options.search ? PoseStart::unknown : PoseStart::scene, options.solver},
@@ -237,8 +239,6 @@ void run_views(const CLI::App& command, PoseCommandOptions& options, const Commo
 }
 
 void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
-  // The outputs are checked before the work.
-  require_writable(options.output);
   check_scene_options(command, options);
   if (!options.views.empty()) return run_views(command, options, common);
   if (options.moving)
@@ -255,6 +255,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const Scene scene = read_photographed_scene(options, bop, common, pictures);
   const Image target = observe(std::move(pictures), options);
   const PoseBodies bodies = parse_moving_meshes(options.meshes, scene);
+  require_outputs({options.output}, options.report);
   const Device device = open_device(common);
   const std::vector<FoundBody> found =
       solve(command, options, rotation, device, scene, target, bodies, common.quiet);

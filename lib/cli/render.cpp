@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-#include "base/output_file.hpp"
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
 #include "cli/lens_options.hpp"
+#include "cli/file_options.hpp"
 #include "cli/option_names.hpp"
 #include "cli/scene_file.hpp"
 #include "cli/text.hpp"
@@ -155,8 +155,6 @@ void print_triangles(const RenderOptions& options, const Scene& scene, const Ren
 
 void run(const CLI::App& command, const RenderOptions& options, CommonOptions& common) {
   require_image_format(options.output);
-  require_writable(options.output);
-  if (!options.saved_scene.empty()) require_writable(options.saved_scene);
   if (options.rigid) common.smoothing.preset = "rigid";
   Scene scene =
       options.scene.empty() ? mesh_scene(command, options, common) : read_scene(options.scene, common);
@@ -182,6 +180,10 @@ void run(const CLI::App& command, const RenderOptions& options, CommonOptions& c
     print_triangles(options, scene, statistics);
     for (const std::string& file : files_beside) std::printf("%s\n", file.c_str());
   }
+  std::vector<std::filesystem::path> outputs = aovs.files();
+  outputs.emplace_back(options.output);
+  if (!options.saved_scene.empty()) outputs.emplace_back(options.saved_scene);
+  require_outputs(outputs);
   if (common.verbose) {
     std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
                 statistics.fragments, statistics.bands, statistics.device_bytes);

@@ -178,6 +178,7 @@ Sequence::Sequence(const std::vector<std::string>& names, Encoding encoding, con
       encoding_(encoding),
       size_of_frames_(scene.width, scene.height) {
   if (std::ranges::none_of(files_, is_video)) size_ = files_.size();
+  std::ranges::for_each(files_, add_input);
 }
 
 Sequence::Sequence(const char* option, const std::vector<std::string>& names, const Scene& scene,

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "base/clock.hpp"
-#include "base/output_file.hpp"
 #include "cli/commands.hpp"
+#include "cli/file_options.hpp"
 #include "cli/option_names.hpp"
 #include "cli/pose_options.hpp"
 #include "cli/pose_pictures.hpp"
@@ -169,8 +169,6 @@ void Run::print() const {
 }
 
 void run(const CLI::App& command, TrackCommandOptions& options, const CommonOptions& common) {
-  // The outputs are checked before the work.
-  require_writable(options.output);
   options.tracker.method = read_least_squares(command, options.least_squares);
   const std::string& mask = options.least_squares.mask;
   if (!mask.empty()) options.tracker.method.mask = read_image(mask, nullptr, Encoding::linear);
@@ -183,6 +181,9 @@ void run(const CLI::App& command, TrackCommandOptions& options, const CommonOpti
         affine(rotation * polar_decomposition(glm::dmat3(transform)).stretch, glm::dvec3(transform[3]));
   }
   Frames frames(options, common, scene);
+  std::vector<std::filesystem::path> outputs{options.output};
+  if (!options.csv.empty()) outputs.emplace_back(options.csv);
+  require_outputs(outputs, options.report);
   const Device device = open_device(common);
   PoseTracker tracker = with_option_names(command, k_least_squares_names,
                                           [&] { return PoseTracker(device, scene, options.tracker); });

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/input_file.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
 
@@ -45,6 +46,7 @@ class Member {
       zip_error_fini(&error);
       throw IoError(file, "cannot be read as npz: " + reason);
     }
+    add_input(file);
     zip_stat_t stat;
     if (zip_stat_index(archive_.get(), 0, 0, &stat) != 0 || (stat.valid & ZIP_STAT_SIZE) == 0) {
       throw IoError(file, "holds no array");

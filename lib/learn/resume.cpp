@@ -44,6 +44,7 @@ LoadedCheckpoint load_of_rank_0(const std::filesystem::path& file, double learni
   LoadedCheckpoint loaded;
   if (std::filesystem::exists(file)) loaded = load_checkpoint(file, learning_rate);
   if (!ranks.is_alone()) ranks.share(loaded.network ? read_file(file) : "");
+  release_input(file);
   return loaded;
 }
 

@@ -30,8 +30,9 @@ std::string material_name(std::uint32_t texture) {
 }
 
 /// Of the PNG file beside an OBJ: image.png, or image.0.png and so on of several.
-std::filesystem::path texture_file(const std::filesystem::path& file, const Mesh& mesh, std::size_t texture) {
-  const std::string number = mesh.textures.size() > 1 ? "." + std::to_string(texture) : "";
+std::filesystem::path texture_file(const std::filesystem::path& file, std::size_t textures,
+                                   std::size_t texture) {
+  const std::string number = textures > 1 ? "." + std::to_string(texture) : "";
   return std::filesystem::path(file).replace_extension(number + ".png");
 }
 
@@ -44,7 +45,7 @@ void write_obj_materials(const std::filesystem::path& file, const Mesh& mesh) {
   const std::string colors = "\nKd 1 1 1\nillum 1\n";  // without highlights
   std::string text = "newmtl " + material_name(k_no_texture) + colors;
   for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
-    const std::filesystem::path image = texture_file(file, mesh, i);
+    const std::filesystem::path image = texture_file(file, mesh.textures.size(), i);
     write_whole_file(image, encode_texture(image, mesh.textures[i]));
     text += "newmtl " + material_name(static_cast<std::uint32_t>(i)) + colors + "map_Kd " +
             (mesh.textures[i].wrap == Wrap::clamp ? "-clamp on " : "") + image.filename().string() + "\n";
@@ -144,6 +145,14 @@ Mesh read_mesh(const std::filesystem::path& file, Notes& notes) {
 Mesh read_mesh(const std::filesystem::path& file) {
   Notes ignored;
   return read_mesh(file, ignored);
+}
+
+std::vector<std::filesystem::path> written_files(const std::filesystem::path& file, std::size_t textures) {
+  std::vector<std::filesystem::path> files{file};
+  if (lower_case_extension(file) != ".obj" || textures == 0) return files;
+  files.push_back(material_file(file));
+  for (std::size_t i = 0; i < textures; ++i) files.push_back(texture_file(file, textures, i));
+  return files;
 }
 
 void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {

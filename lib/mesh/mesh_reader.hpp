@@ -31,6 +31,10 @@ Mesh read_off(const std::filesystem::path& file, std::string_view text);
 Mesh read_stl(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 Mesh read_gltf(const std::filesystem::path& file, std::string_view bytes, Notes& notes);
 
+/// The files that write_mesh() makes of a mesh with that many textures and no materials, itself first: OBJ has others
+/// beside it.
+std::vector<std::filesystem::path> written_files(const std::filesystem::path& file, std::size_t textures);
+
 /// The bytes of a GLB file of a valid mesh. Throws IoError, which names the file, where they are too many.
 std::string glb_bytes(const std::filesystem::path& file, const Mesh& mesh);
 

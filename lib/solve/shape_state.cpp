@@ -224,6 +224,7 @@ void write_checkpoint(const std::filesystem::path& file, const ShapeState& state
 ShapeState read_checkpoint(const std::filesystem::path& file, std::uint64_t fingerprint,
                            const Smoothing& finest, std::size_t cameras) {
   const std::string bytes = read_file(file);
+  release_input(file);
   if (!bytes.starts_with(k_magic)) throw IoError(file, "is no checkpoint of a shape, or of another version");
   const auto fail = [&] { throw IoError(file, "the checkpoint is damaged"); };
   if (bytes.size() < k_head_size) fail();
