@@ -69,7 +69,7 @@ void resize(ShapeViews& views, glm::ivec2 size) {
 ShapeViews read_views(const CLI::App& command, const std::string& text, const FitCommandOptions& options,
                       const CommonOptions& common) {
   Notes notes;
-  ViewsFile file = parse_views_file(options.views, text, notes, common.encoding());
+  ViewsFile file = parse_views_file(options.views, text, notes, common.encoding(), options.initial.empty());
   ShapeViews& views = file.views;
   if (!options.initial.empty()) views.initial = read_mesh(options.initial, notes);
   if (std::ranges::none_of(views.views, &ShapeView::has_alpha)) {

@@ -139,7 +139,7 @@ ShapeViews parse_views(const std::filesystem::path& file, std::string_view text,
 }
 
 ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes,
-                           Encoding encoding) {
+                           Encoding encoding, bool with_initial) {
   const nlohmann::json document = parse_json(file, text);
   const JsonNode node(document, file);
   node.require_keys({"width", "height", "background", "views", "initial", "smoothing", "depth_scale"});
@@ -154,7 +154,10 @@ ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view t
     views.views.push_back(parse_view(view, file, views, encoding, measured));
   measured.append_to(notes);
   if (views.views.empty()) node.at("views").fail("none", "at least one");
-  if (const auto initial = node.find("initial")) views.initial = read_mesh(initial->file_in(folder), notes);
+  if (const auto initial = node.find("initial")) {
+    add_input(folder / initial->string());  // also where it is not read
+    if (with_initial) views.initial = read_mesh(initial->file_in(folder), notes);
+  }
   if (const auto smoothing = node.find("smoothing")) result.smoothing = parse_smoothing(*smoothing);
   return result;
 }

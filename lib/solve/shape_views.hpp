@@ -18,9 +18,9 @@ struct ViewsFile {
 };
 
 /// Parses a file of views. Messages call it `file`, and images are looked for beside that path. Throws as
-/// read_views() does.
+/// read_views() does. Without its initial mesh the file that this is in may be missing.
 ViewsFile parse_views_file(const std::filesystem::path& file, std::string_view text, Notes& notes,
-                           Encoding encoding = Encoding::srgb);
+                           Encoding encoding = Encoding::srgb, bool with_initial = true);
 /// The same, resolved.
 ShapeViews parse_views(const std::filesystem::path& file, std::string_view text, Notes& notes);
 

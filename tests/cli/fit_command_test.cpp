@@ -456,6 +456,17 @@ TEST_SUITE("robustness") {
     write_inputs(folder);
     std::filesystem::create_directories(folder / "report");
     for (const std::string name : {"mesh.ply", "mesh.obj", "report/targets.png", "report/plot.png",
+  TEST_CASE("dpr fit --initial takes the place of the views file's mesh, which is not read") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    json views = write_inputs(folder);
+    views["initial"] = "none.ply";
+    folder.write("views.json", views.dump());
+    const auto outcome = run_command(folder, with(k_short, {"--initial", "cube.ply"}));
+    CAPTURE(outcome.err);
+    CHECK(outcome.status == 0);
+  }
+
                                    "report/fit.json", "report/index.html"}) {
       std::filesystem::create_symlink("/dev/full", folder / name);
       const bool is_mesh = name.starts_with("mesh");

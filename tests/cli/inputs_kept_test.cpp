@@ -86,6 +86,7 @@ TEST_SUITE("pipeline") {
             "read as v0.png");
     const std::string fit = "fit --views views.json --levels 1 --iterations 1 -o ";
     refuses(fit + "cube.ply", "cube.ply: cannot be written", "read as cube.ply");
+    refuses(fit + "cube.ply --initial cube.obj", "cube.ply: cannot be written", "read as cube.ply");
     refuses(fit + "v0.obj --texture 200", "v0.png: cannot be written", "read as v0.png");
     refuses(fit + "link.obj --texture 200", "link.png: cannot be written", "read as v0.png");
     refuses(fit + "a.obj --checkpoint cube.ply", "cube.ply: cannot be written", "read as cube.ply");
