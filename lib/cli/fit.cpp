@@ -101,7 +101,16 @@ void require_measured(const CLI::App& command, const char* name, float weight, c
                         "an image of one beside every view's, in the views file");
 }
 
-void check_output_format(const FitCommandOptions& options) {
+/// Throws for an option that changes nothing without another one.
+void require_used(const CLI::App& command, const char* name, bool is_used, const std::string& other) {
+  if (command.count(name) == 0 || is_used) return;
+  throw InvalidArgument(std::string(name) + " (command line)", "one without " + other, other + " beside it");
+}
+
+void check_options(const CLI::App& command, const FitCommandOptions& options) {
+  require_used(command, "--camera-learning-rate", options.solver.refine_cameras, "--refine-cameras");
+  require_used(command, "--robust-scale", options.solver.loss.robust > 0, "--robust");
+  require_used(command, "--checkpoint-interval", !options.checkpoint.empty(), "--checkpoint");
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".obj" && extension != ".ply" && extension != ".glb") {
     throw InvalidArgument("--output (command line)", "\"" + options.output + "\"",
@@ -210,7 +219,7 @@ ShapeTexture write_textured(const FitCommandOptions& options, const std::vector<
 }
 
 void run(const CLI::App& command, FitCommandOptions& options, const CommonOptions& common) {
-  check_output_format(options);
+  check_options(command, options);
   options.solver.steps = parse_steps(options.steps);
   if (is_adaptive_schedule(options.schedule)) options.solver.schedule = ShapeSchedule::adaptive;
   const std::string text = read_file(options.views);

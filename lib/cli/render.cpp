@@ -241,7 +241,9 @@ void add_render_command(CLI::App& application, CommonOptions& common) {
       ->type_name("NAME[,NAME]");
   add_lens_options(*command, options->lens);
   add_common_options(*command, common);
-  command->get_option("--rigid")->excludes(command->get_option("--preset"));
+  for (CLI::Option* smoothing : command->get_options()) {
+    if (smoothing->get_group() == k_smoothing_group) command->get_option("--rigid")->excludes(smoothing);
+  }
   for (const char* const fitted : {"--elevation", "--azimuth", "--save-scene"}) {
     command->get_option(fitted)->excludes(command->get_option("--scene"));
   }

@@ -436,6 +436,12 @@ TEST_SUITE("robustness") {
     fails(good, with(k_short, {"--sigma", ""}), "--sigma (command line): got \"\", expected a number");
     fails(good, with(k_short, {"--blur-end", "0"}), "--blur-end (command line)");
     fails(good, with(k_short, {"--camera-learning-rate", "0"}), "--camera-learning-rate (command line)");
+    fails(good, with(k_short, {"--camera-learning-rate", "0.1"}),
+          "--camera-learning-rate (command line): got one without --refine-cameras");
+    fails(good, with(k_short, {"--robust-scale", "0.1"}),
+          "--robust-scale (command line): got one without --robust");
+    fails(good, with(k_short, {"--checkpoint-interval", "9"}), "got one without --checkpoint");
+    fails(changed([](json& v) { v["initial"] = "none.ply"; }), k_short, "none.ply");
     fails(good, with(k_short, {"--save-views", "nowhere/views.json"}), "nowhere");
     fails(changed([](json& v) { v["views"] = json::array({v["views"][0]}); }),
           with(k_short, {"--refine-cameras"}), "at least two");
@@ -450,12 +456,6 @@ TEST_SUITE("robustness") {
     CHECK(folder.read("garbage") == "no checkpoint");
   }
 
-  TEST_CASE("dpr fit: an output that finds no room is an error that names it") {
-    if (is_skipped()) return;
-    const TempDir folder;
-    write_inputs(folder);
-    std::filesystem::create_directories(folder / "report");
-    for (const std::string name : {"mesh.ply", "mesh.obj", "report/targets.png", "report/plot.png",
   TEST_CASE("dpr fit --initial takes the place of the views file's mesh, which is not read") {
     if (is_skipped()) return;
     const TempDir folder;
@@ -467,6 +467,12 @@ TEST_SUITE("robustness") {
     CHECK(outcome.status == 0);
   }
 
+  TEST_CASE("dpr fit: an output that finds no room is an error that names it") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    std::filesystem::create_directories(folder / "report");
+    for (const std::string name : {"mesh.ply", "mesh.obj", "report/targets.png", "report/plot.png",
                                    "report/fit.json", "report/index.html"}) {
       std::filesystem::create_symlink("/dev/full", folder / name);
       const bool is_mesh = name.starts_with("mesh");

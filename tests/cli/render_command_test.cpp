@@ -103,6 +103,17 @@ TEST_SUITE("pipeline") {
                    "1 triangle outside the image"));
   }
 
+  TEST_CASE("dpr render --rigid leaves no smoothing to set") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    dpr::write_mesh(folder / "cube.ply", dpr::make_cube());
+    const auto outcome =
+        run_command(folder, {"render", "cube.ply", "-o", "a.png", "--rigid", "--sigma", "1e-2"});
+    CHECK(outcome.status == 1);
+    CHECK(contains(outcome.err, "got both --rigid and --sigma, expected one of the two"));
+    dpr::test::succeed(folder, {"render", "cube.ply", "-o", "a.png", "--rigid", "--seed", "2"});
+  }
+
   TEST_CASE("dpr render --save-scene: the scene file shows the same image to the bit") {
     if (is_skipped()) return;
     const TempDir folder;
