@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "cli/text.hpp"
-#include "cli/triangles_in_view.hpp"
 
 namespace dpr::cli {
 namespace {

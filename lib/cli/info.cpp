@@ -9,13 +9,14 @@
 #include "cli/commands.hpp"
 #include "cli/json.hpp"
 #include "cli/mesh_materials.hpp"
-#include "cli/triangles_in_view.hpp"
+#include "cli/text.hpp"
 #include "image/texture_words.hpp"
 #include "mesh/bounding_box.hpp"
 #include "mesh/mesh_facts.hpp"
 #include "mesh/opacity.hpp"
 #include "scene/gradient_table.hpp"
 #include "scene/light_table.hpp"
+#include "scene/triangles_in_view.hpp"
 
 namespace dpr::cli {
 namespace {

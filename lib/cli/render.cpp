@@ -14,7 +14,6 @@
 #include "cli/option_names.hpp"
 #include "cli/scene_file.hpp"
 #include "cli/text.hpp"
-#include "cli/triangles_in_view.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -23,6 +22,7 @@
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
 #include "smoothing/option_fields.hpp"
+#include "scene/triangles_in_view.hpp"
 
 namespace dpr::cli {
 namespace {

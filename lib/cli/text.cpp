@@ -69,6 +69,10 @@ std::uint64_t parse_whole_number(const std::string& text, const std::string& arg
       "a whole number from 0 to " + std::to_string(std::numeric_limits<std::uint64_t>::max()));
 }
 
+std::string counted(std::size_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
 bool is_adaptive_schedule(const std::string& word) {
   if (word == "adaptive") return true;
   if (word == "anneal") return false;

@@ -20,6 +20,9 @@ std::string format(const char* pattern, Values... values) {
 /// A number with at least so many digits: "0042".
 std::string padded(std::uint64_t number, std::size_t digits);
 
+/// "1 triangle", "2 triangles".
+std::string counted(std::size_t count, const std::string& what);
+
 /// "640x480". Throws InvalidArgument.
 glm::ivec2 parse_size(const std::string& text);
 

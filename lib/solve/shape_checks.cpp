@@ -8,10 +8,27 @@
 #include "base/checks.hpp"
 #include "loss/image_loss_impl.hpp"
 #include "mesh/opacity.hpp"
+#include "scene/triangles_in_view.hpp"
 #include "solve/measured_images.hpp"
 #include "solve/shape_space.hpp"
 
 namespace dpr {
+namespace {
+
+/// Throws unless some view has a triangle of the initial mesh before its camera.
+void require_in_view(const Mesh& mesh, const ShapeViews& views) {
+  Scene scene;
+  scene.width = views.width;
+  scene.height = views.height;
+  scene.meshes.push_back({mesh});
+  for (const ShapeView& view : views.views) {
+    scene.camera = view.camera;
+    if (triangles_in_view(scene, 0).not_shown() < mesh.faces.size()) return;
+  }
+  throw InvalidArgument("initial mesh (shape)", "one that no image shows", "one that some image shows");
+}
+
+}  // namespace
 
 bool compares_colors(const LossWeights& weights) {
   return std::ranges::any_of(image_losses(), [&](const ImageLossRow& loss) {
@@ -41,6 +58,7 @@ void check_shape_views(const ShapeViews& views) {
   checks::require_finite(views.background, "background (shape)");
   if (views.initial) validate(*views.initial, "initial (shape)");
   if (views.initial) require_opaque(*views.initial, "initial mesh");
+  if (views.initial) require_in_view(*views.initial, views);
   if (views.lights) validate(*views.lights);
   if (views.smoothing) validate(*views.smoothing);
 }

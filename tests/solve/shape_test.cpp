@@ -300,6 +300,14 @@ TEST_SUITE("robustness") {
     refuses([](ShapeViews& v) { v.views[0].image.pixels[3].x = std::numeric_limits<float>::infinity(); },
             nothing);
     refuses([](ShapeViews& v) { v.initial = Mesh{}; }, nothing);
+    const auto refuses_initial = [&](auto change) {
+      ShapeViews wrong = views;
+      for (glm::vec3& p : wrong.initial->positions) p = change(p);
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, ShapeSolver(device, wrong, ShapeOptions()),
+                            "initial mesh (shape): got one that no image shows");
+    };
+    refuses_initial([](glm::vec3 p) { return p + glm::vec3(100, 0, 0); });
+    refuses_initial([](glm::vec3) { return k_place; });  // no area
     refuses([](ShapeViews& v) { v.views[0].depth = dpr::Image(4, 8, glm::vec4(1)); }, nothing);
     refuses([](ShapeViews& v) { v.views[0].normal = dpr::Image(8, 8); }, nothing);  // no pixel counts
     refuses([](ShapeViews& v) { v.views[0].depth = dpr::Image(8, 8, glm::vec4(-1)); }, nothing);

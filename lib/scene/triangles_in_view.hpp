@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
 
 #include "dpr/scene.hpp"
 
-namespace dpr::cli {
+namespace dpr {
 
 /// Numbers of triangles, each counted for the first reason that holds.
 struct TrianglesInView {
@@ -15,12 +14,11 @@ struct TrianglesInView {
   std::size_t far = 0;      ///< wholly beyond zfar
   std::size_t outside = 0;  ///< wholly to one side of the image; not counted of a lens' images
   std::size_t clipped = 0;  ///< at znear; their rest is drawn
+
+  std::size_t not_shown() const { return without_area + near + far + outside; }
 };
 
 /// Counts the triangles of the mesh at an entry of Scene::meshes.
 TrianglesInView triangles_in_view(const Scene& scene, std::size_t entry);
 
-/// "1 triangle", "2 triangles".
-std::string counted(std::size_t count, const std::string& what);
-
-}  // namespace dpr::cli
+}  // namespace dpr

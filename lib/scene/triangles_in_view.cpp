@@ -1,11 +1,11 @@
-#include "cli/triangles_in_view.hpp"
+#include "scene/triangles_in_view.hpp"
 
 #include <algorithm>
 #include <vector>
 
 #include "mesh/mesh_facts.hpp"
 
-namespace dpr::cli {
+namespace dpr {
 namespace {
 
 /// The edges of a scene's image.
@@ -67,8 +67,4 @@ TrianglesInView triangles_in_view(const Scene& scene, std::size_t entry) {
   return counts;
 }
 
-std::string counted(std::size_t count, const std::string& what) {
-  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
-}
-
-}  // namespace dpr::cli
+}  // namespace dpr
