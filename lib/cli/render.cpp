@@ -6,11 +6,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "cli/aov_files.hpp"
 #include "cli/commands.hpp"
-#include "cli/lens_options.hpp"
 #include "cli/file_options.hpp"
+#include "cli/lens_options.hpp"
 #include "cli/option_names.hpp"
 #include "cli/scene_file.hpp"
 #include "cli/text.hpp"
@@ -21,8 +22,8 @@
 #include "mesh/bounding_box.hpp"
 #include "scene/light_table.hpp"
 #include "scene/scene_parts.hpp"
-#include "smoothing/option_fields.hpp"
 #include "scene/triangles_in_view.hpp"
+#include "smoothing/option_fields.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -57,7 +58,10 @@ Camera fit_camera(const CLI::App& command, const Sphere& sphere, const RenderOpt
   constexpr float k_fov_y_degrees = 40.0F;
   const float aspect = static_cast<float>(width) / static_cast<float>(height);
   const float half_tangent = std::tan(glm::radians(k_fov_y_degrees / 2)) * std::min(1.0F, aspect);
-  const float radius = k_margin * std::max(sphere.radius, 1e-6F);
+  // What numbers at that place cannot tell from a point is a point, which any camera suits.
+  const float least = 1e-6F * glm::length(sphere.center);
+  const float largest = std::max(sphere.radius, least);
+  const float radius = k_margin * (largest > 0 ? largest : 1.0F);
   const float distance = radius / std::sin(std::atan(half_tangent));
   if (!std::isfinite(distance))
     throw IoError(options.mesh,
@@ -125,8 +129,8 @@ void set_shading(Scene& scene, const std::string& word) {
   scene.lights->shading = shading;
 }
 
-/// Prints the number of triangles, and of those that the camera does not show.
-void print_triangles(const RenderOptions& options, const Scene& scene, const RenderStatistics& statistics) {
+/// The triangles of all meshes, and those of them that the camera does not show.
+std::pair<std::size_t, TrianglesInView> count_triangles(const Scene& scene) {
   std::size_t faces = 0;
   TrianglesInView sum;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
@@ -137,6 +141,21 @@ void print_triangles(const RenderOptions& options, const Scene& scene, const Ren
     sum.far += counts.far;
     sum.outside += counts.outside;
   }
+  return {faces, sum};
+}
+
+/// The reason for a picture without a fragment.
+std::string why_empty(const Scene& scene) {
+  const auto [faces, sum] = count_triangles(scene);
+  const std::size_t in_view = faces - sum.not_shown();
+  if (in_view == 0) return "no triangle is in front of the camera, within the image, between znear and zfar";
+  return counted(in_view, "triangle") + " in view, " + (scene.cull == Cull::none ? "" : "culled, or ") +
+         "too small to be seen or too large for single precision";
+}
+
+/// Prints the number of triangles, and of those that the camera does not show.
+void print_triangles(const RenderOptions& options, const Scene& scene, const RenderStatistics& statistics) {
+  const auto [faces, sum] = count_triangles(scene);
   std::printf("%s: %dx%d, %s", options.output.c_str(), scene.width, scene.height,
               counted(faces, "triangle").c_str());
   if (statistics.faces > faces) std::printf(", cut into %zu for the lens", statistics.faces);
@@ -161,6 +180,10 @@ void run(const CLI::App& command, const RenderOptions& options, CommonOptions& c
   if (options.shading) set_shading(scene, *options.shading);
   if (options.cull) scene.cull = parse_cull(*options.cull, "--cull");
   const AovFiles aovs(options.aovs, options.output, scene);
+  std::vector<std::filesystem::path> outputs = aovs.files();
+  outputs.emplace_back(options.output);
+  if (!options.saved_scene.empty()) outputs.emplace_back(options.saved_scene);
+  require_outputs(outputs);
   const SubdividedScene drawn = subdivide(command, scene, options.lens);
   Renderer renderer(open_device(common));
   renderer.set_scene(drawn.scene);
@@ -171,19 +194,11 @@ void run(const CLI::App& command, const RenderOptions& options, CommonOptions& c
   write_image(options.output, keeps_silhouette ? image : opaque(image), common.encoding());
   const std::vector<std::string> files_beside = aovs.write(renderer, scene, drawn);
   if (!options.saved_scene.empty()) write_scene(options.saved_scene, scene, {options.mesh});
-  if (statistics.fragments == 0) {
-    print_notes({"the picture is empty: no triangle is in front of the camera, within the image, between "
-                 "znear and zfar"},
-                common);
-  }
+  if (statistics.fragments == 0) print_notes({"the picture is empty: " + why_empty(scene)}, common);
   if (!common.quiet) {
     print_triangles(options, scene, statistics);
     for (const std::string& file : files_beside) std::printf("%s\n", file.c_str());
   }
-  std::vector<std::filesystem::path> outputs = aovs.files();
-  outputs.emplace_back(options.output);
-  if (!options.saved_scene.empty()) outputs.emplace_back(options.saved_scene);
-  require_outputs(outputs);
   if (common.verbose) {
     std::printf("%zu tile pairs, %zu fragments in %zu bands, %zu bytes on the device\n", statistics.pairs,
                 statistics.fragments, statistics.bands, statistics.device_bytes);

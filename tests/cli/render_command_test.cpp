@@ -114,6 +114,30 @@ TEST_SUITE("pipeline") {
     dpr::test::succeed(folder, {"render", "cube.ply", "-o", "a.png", "--rigid", "--seed", "2"});
   }
 
+  TEST_CASE("dpr render: meshes of any size fill the picture, or the message says why not") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    const auto render = [&](const std::string& s, const std::vector<std::string>& input) {
+      folder.write("one.obj",
+                   "v -" + s + " -" + s + " 0\nv " + s + " -" + s + " 0\nv 0 " + s + " 0\nf 1 2 3\n");
+      std::vector<std::string> arguments{"render", "-o", "a.png", "--size", "16x16"};
+      arguments.insert(arguments.end(), input.begin(), input.end());
+      return run_command(folder, arguments);
+    };
+    for (const std::string unit : {"1e-3", "1e-8"}) {
+      const auto outcome = render(unit, {"one.obj"});
+      CAPTURE(outcome.err);
+      CHECK(outcome.status == 0);
+      CHECK(outcome.err.empty());
+    }
+    CHECK(contains(render("1e-12", {"one.obj"}).err, "another unit of length"));
+    folder.write("scene.json", R"({"meshes": [{"file": "one.obj"}], "width": 16, "height": 16,
+        "camera": {"view": [[1,0,0,0],[0,1,0,0],[0,0,1,-5],[0,0,0,1]]}})");
+    for (const std::string unit : {"1e-9", "1e20"})
+      CHECK(contains(render(unit, {"--scene", "scene.json"}).err,
+                     "empty: 1 triangle in view, too small to be seen or too large for single precision"));
+  }
+
   TEST_CASE("dpr render --save-scene: the scene file shows the same image to the bit") {
     if (is_skipped()) return;
     const TempDir folder;
