@@ -42,7 +42,8 @@ struct ShapeViews {
   int width = 0, height = 0;  ///< of every image
   vec3 background{0.0F};
   std::vector<ShapeView> views;
-  /// Grey without vertex colours. None: the surface of all points that no view shows beside the object (the visual
+  /// Its textures, read at the corners, and the colours of its faces become colours of vertices, by means over the
+  /// faces' areas; grey without any. None: the surface of all points that no view shows beside the object (the visual
   /// hull, Laurentini 1994), nor before what depths say, where enough views have alpha to bound it; else an icosphere
   /// in the common view.
   std::optional<Mesh> initial;

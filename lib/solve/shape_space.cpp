@@ -4,8 +4,10 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/checks.hpp"
+#include "dpr/texture_map.hpp"
 #include "mesh/bounding_box.hpp"
 #include "solve/resample.hpp"
 
@@ -33,14 +35,62 @@ glm::dvec3 meeting_point(const ShapeViews& views) {
   return glm::inverse(sum) * right;
 }
 
+constexpr glm::vec3 k_grey(0.5F);
+
+/// The textures' colours of corners, [3 face + corner]; white where a face has no texture.
+std::vector<glm::vec3> texture_colors(const Mesh& mesh) {
+  std::vector<glm::vec3> colors(3 * mesh.faces.size(), glm::vec3(1));
+  for (std::size_t t = 0; t < mesh.textures.size(); ++t) {
+    std::vector<std::size_t> corners;
+    std::vector<float> coordinates;
+    for (std::size_t i = 0; i < colors.size(); ++i) {
+      const std::size_t face = i / 3;
+      if ((mesh.face_textures.empty() ? 0 : mesh.face_textures[face]) != t) continue;
+      const glm::vec2 uv = mesh.texcoords[mesh.face_texcoords[face][static_cast<int>(i % 3)]];
+      corners.push_back(i);
+      coordinates.insert(coordinates.end(), {uv.x, uv.y});
+    }
+    const TextureMap map(mesh.textures[t]);
+    const std::vector<float> values = map.values({coordinates});
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      for (int c = 0; c < 3; ++c)
+        colors[corners[k]][c] = values[k * map.channels() + static_cast<std::size_t>(c)];
+    }
+  }
+  return colors;
+}
+
+/// The mean of each vertex' colours in its faces, by their area.
+std::vector<glm::vec3> mean_colors(const Mesh& mesh) {
+  std::vector<glm::vec3> corners = texture_colors(mesh), colors;
+  std::vector<glm::dvec4> sums(mesh.positions.size(), glm::dvec4(0));  // the last is the weight
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const glm::uvec3& face = mesh.faces[i / 3];
+    const std::uint32_t vertex = face[static_cast<int>(i % 3)];
+    if (!mesh.face_colors.empty()) corners[i] *= mesh.face_colors[i / 3];
+    if (!mesh.vertex_colors.empty()) corners[i] *= mesh.vertex_colors[vertex];
+    const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
+    // Faces without area count where there are no others.
+    const double weight = glm::length(glm::cross(b - a, c - a)) + std::numeric_limits<double>::min();
+    sums[vertex] += weight * glm::dvec4(corners[i], 1);
+  }
+  for (const glm::dvec4& sum : sums)
+    colors.push_back(sum.w > 0 ? glm::vec3(glm::dvec3(sum) / sum.w) : k_grey);
+  return colors;
+}
+
 }  // namespace
 
 Mesh with_vertex_colors(Mesh mesh) {
   Mesh shape;
+  if (!mesh.textures.empty() || !mesh.face_colors.empty()) {
+    shape.vertex_colors = mean_colors(mesh);
+  } else {
+    shape.vertex_colors = std::move(mesh.vertex_colors);
+  }
   shape.positions = std::move(mesh.positions);
   shape.faces = std::move(mesh.faces);
-  shape.vertex_colors = std::move(mesh.vertex_colors);
-  if (shape.vertex_colors.empty()) shape.vertex_colors.assign(shape.positions.size(), glm::vec3(0.5F));
+  if (shape.vertex_colors.empty()) shape.vertex_colors.assign(shape.positions.size(), k_grey);
   return shape;
 }
 

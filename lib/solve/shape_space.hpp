@@ -7,7 +7,7 @@
 
 namespace dpr {
 
-/// The initial mesh with vertex colours, grey where it has none. Nothing else of its surface stays.
+/// The initial mesh with vertex colours, as ShapeViews::initial has them. Nothing else of its surface stays.
 Mesh with_vertex_colors(Mesh mesh);
 
 /// Throws InvalidArgument where a camera is to be found first; `where` is in its message.

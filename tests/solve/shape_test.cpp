@@ -139,6 +139,33 @@ TEST_SUITE("unit") {
     CHECK(dpr::common_view(views).radius == doctest::Approx(0.9 * 0.5));
   }
 
+  TEST_CASE("an initial mesh keeps its colours as those of vertices") {
+    Mesh mesh;  // two triangles at an edge, the second twice as large, and one without area
+    mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, -2, 0}, {9, 9, 9}};
+    mesh.faces = {{0, 1, 2}, {0, 3, 1}, {4, 4, 4}};
+    const auto check = [&](const std::vector<glm::vec3>& expected) {
+      const Mesh shape = dpr::with_vertex_colors(mesh);
+      CHECK(shape.faces == mesh.faces);
+      CHECK(shape.textures.empty());
+      REQUIRE(shape.vertex_colors.size() == expected.size());
+      for (std::size_t v = 0; v < expected.size(); ++v)
+        CHECK(glm::distance(shape.vertex_colors[v], expected[v]) < 1e-6F);
+    };
+    check(std::vector<glm::vec3>(5, glm::vec3(0.5F)));
+    mesh.face_colors = {{3, 0, 0}, {0, 3, 0}, {0, 0, 1}};
+    check({{1, 2, 0}, {1, 2, 0}, {3, 0, 0}, {0, 3, 0}, {0, 0, 1}});
+
+    // The textures' texels, at the corners' coordinates, times the colours.
+    mesh.textures = {{2, 1, {{0.5F, 0, 0}, {1, 0, 0}}, dpr::Wrap::clamp}, {1, 1, {{1, 0.25F, 1}}}};
+    mesh.texcoords = {{0, 0}, {1, 1}};
+    mesh.face_texcoords = {{0, 1, 0}, {0, 0, 0}, {0, 0, 0}};
+    mesh.face_textures = {0, 1, dpr::k_no_texture};
+    check({{0.5F, 0.5F, 0}, {1, 0.5F, 0}, {1.5F, 0, 0}, {0, 0.75F, 0}, {0, 0, 1}});
+    mesh.face_colors.clear();
+    mesh.vertex_colors.assign(5, {2, 2, 2});
+    check({{5.0F / 3, 1.0F / 3, 4.0F / 3}, {2, 1.0F / 3, 4.0F / 3}, {1, 0, 0}, {2, 0.5F, 2}, {2, 2, 2}});
+  }
+
   TEST_CASE("large steps solve (I + lambda L) x = b") {
     const Mesh mesh = dpr::make_torus(1, 0.3F, 5, 4);
     const double lambda = 7;
