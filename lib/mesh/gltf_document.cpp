@@ -110,7 +110,8 @@ void GltfDocument::read_container(std::string_view bytes) {
   const auto length = little_endian<std::uint32_t>(bytes, 8);
   require(length <= bytes.size(),
           "the file is truncated: its header promises " + std::to_string(length) + " bytes");
-  bytes = bytes.substr(0, length);
+  require(length == bytes.size(),
+          "the file goes on after the " + std::to_string(length) + " bytes that its header promises");
   for (std::size_t place = k_header, chunk = 0; place < bytes.size(); ++chunk) {
     require(bytes.size() - place >= k_chunk_header, "the file is truncated");
     const auto size = little_endian<std::uint32_t>(bytes, place),

@@ -374,6 +374,8 @@ TEST_SUITE("robustness") {
       CAPTURE(size);
       CHECK_THROWS_AS(read_mesh(folder.write("part.glb", whole.substr(0, size))), Error);
     }
+    DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("longer.glb", whole + "more")),
+                          "the file goes on after");
     for (std::size_t i = 4; i < 24; ++i) {
       std::string other = whole;
       other[i] = static_cast<char>(other[i] ^ 0x40);
