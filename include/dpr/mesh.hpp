@@ -96,10 +96,12 @@ DPR_API void validate(const Mesh& mesh, const std::string& name = "mesh");
 DPR_API Mesh read_mesh(const std::filesystem::path& file);
 
 /// Writes OBJ, PLY or GLB, by the extension, each file through a temporary one that is renamed at the end. GLB takes
-/// all but materials; textures become PNG within it, sRGB in 8 bits; vertices are numbered anew, in the order of the
-/// faces. OBJ has no face colours: asking for that is an error, not a silent loss. Its textures become PNG files beside
-/// it (x.png; x.0.png, x.1.png of several), named by the materials of x.mtl. PLY colours are bytes, as other programs
-/// expect them: clamped to [0, 1] and rounded; it has no texture coordinates, textures or normals. Throws IoError, and
+/// all but materials; textures become PNG within it, sRGB in 8 bits, clamped to [0, 1]; vertices are numbered anew, in
+/// the order of the faces. OBJ has no face colours, nor highlights below 0: asking for them is an error, not a silent
+/// loss. Its textures become such PNG files beside it (x.png; x.0.png, x.1.png of several), named by the materials of
+/// x.mtl, which keep Wrap::clamp, but neither Wrap::mirror (they repeat) nor filters; a textured mesh without materials
+/// is written as one without highlights. PLY colours are bytes, as other programs expect them: clamped to [0, 1] and
+/// rounded; it has no texture coordinates, textures, normals or materials. Throws IoError, and
 /// InvalidArgument where the mesh is not valid, or has opacities below 1.
 DPR_API void write_mesh(const std::filesystem::path& file, const Mesh& mesh);
 

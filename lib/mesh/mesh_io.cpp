@@ -1,6 +1,8 @@
 // Mesh files: their content goes to the reader of its format, and comes from the writer.
 #include <algorithm>
 #include <array>
+#include <optional>
+#include <set>
 
 #include "base/checks.hpp"
 #include "base/input_file.hpp"
@@ -24,10 +26,26 @@ void append(std::string& text, const glm::vec3& values) {
   for (int i = 0; i < 3; ++i) text += " " + checks::text(values[i]);
 }
 
-/// Name of the material with a texture, in an OBJ's library.
-std::string material_name(std::uint32_t texture) {
-  return texture == k_no_texture ? "plain" : "texture" + std::to_string(texture);
+/// Texture and material of a face.
+struct ObjSurface {
+  std::uint32_t texture = k_no_texture, material = 0;
+  auto operator<=>(const ObjSurface&) const = default;
+};
+
+ObjSurface surface_of(const Mesh& mesh, std::size_t face) {
+  ObjSurface surface;
+  if (!mesh.textures.empty()) surface.texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+  if (!mesh.face_materials.empty()) surface.material = mesh.face_materials[face];
+  return surface;
 }
+
+/// Its name in an OBJ's library.
+std::string surface_name(const Mesh& mesh, const ObjSurface& surface) {
+  return (surface.texture == k_no_texture ? "plain" : "texture" + std::to_string(surface.texture)) +
+         (mesh.materials.size() > 1 ? "_" + std::to_string(surface.material) : "");
+}
+
+bool has_library(const Mesh& mesh) { return !mesh.textures.empty() || !mesh.materials.empty(); }
 
 /// Of the PNG file beside an OBJ: image.png, or image.0.png and so on of several.
 std::filesystem::path texture_file(const std::filesystem::path& file, std::size_t textures,
@@ -42,13 +60,27 @@ std::filesystem::path material_file(const std::filesystem::path& file) {
 
 /// Writes an OBJ's library, and the textures beside it.
 void write_obj_materials(const std::filesystem::path& file, const Mesh& mesh) {
-  const std::string colors = "\nKd 1 1 1\nillum 1\n";  // without highlights
-  std::string text = "newmtl " + material_name(k_no_texture) + colors;
-  for (std::size_t i = 0; i < mesh.textures.size(); ++i) {
-    const std::filesystem::path image = texture_file(file, mesh.textures.size(), i);
-    write_whole_file(image, encode_texture(image, mesh.textures[i]));
-    text += "newmtl " + material_name(static_cast<std::uint32_t>(i)) + colors + "map_Kd " +
-            (mesh.textures[i].wrap == Wrap::clamp ? "-clamp on " : "") + image.filename().string() + "\n";
+  const auto image = [&](std::size_t texture) { return texture_file(file, mesh.textures.size(), texture); };
+  for (std::size_t i = 0; i < mesh.textures.size(); ++i)
+    write_whole_file(image(i), encode_texture(image(i), mesh.textures[i]));
+  std::set<ObjSurface> surfaces;
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) surfaces.insert(surface_of(mesh, f));
+  std::string text;
+  for (const ObjSurface& surface : surfaces) {
+    text += "newmtl " + surface_name(mesh, surface) + "\nKd 1 1 1\n";
+    if (mesh.materials.empty()) {
+      text += "illum 1\n";  // without highlights
+    } else {
+      const Material& material = mesh.materials[surface.material];
+      text += "illum 2\nKs";
+      append(text, material.specular);
+      if (material.shininess) text += "\nNs " + checks::text(*material.shininess);
+      text += '\n';
+    }
+    if (surface.texture == k_no_texture) continue;
+    const bool is_clamped = mesh.textures[surface.texture].wrap == Wrap::clamp;
+    text += std::string("map_Kd ") + (is_clamped ? "-clamp on " : "") +
+            image(surface.texture).filename().string() + "\n";
   }
   write_whole_file(material_file(file), text);
 }
@@ -57,8 +89,12 @@ std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
   if (!mesh.face_colors.empty()) {
     throw IoError(file, "OBJ has no face colours: expected vertex colours, or the extension .ply");
   }
+  for (const Material& material : mesh.materials) {
+    if (glm::any(glm::lessThan(material.specular, glm::vec3(0))))
+      throw IoError(file, "OBJ has no highlights below 0: expected a material with a specular of at least 0");
+  }
   std::string text;
-  if (!mesh.textures.empty()) text += "mtllib " + material_file(file).filename().string() + "\n";
+  if (has_library(mesh)) text += "mtllib " + material_file(file).filename().string() + "\n";
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     text += "v";
     append(text, mesh.positions[i]);
@@ -73,11 +109,11 @@ std::string obj_text(const std::filesystem::path& file, const Mesh& mesh) {
     append(text, normal);
     text += '\n';
   }
-  std::optional<std::uint32_t> material;  // of the last face
+  std::optional<ObjSurface> last;
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[f];
-    if (!mesh.textures.empty() && material != texture) text += "usemtl " + material_name(texture) + "\n";
-    material = texture;
+    const ObjSurface surface = surface_of(mesh, f);
+    if (has_library(mesh) && last != surface) text += "usemtl " + surface_name(mesh, surface) + "\n";
+    last = surface;
     text += "f";
     for (int i = 0; i < 3; ++i) {
       text += " " + std::to_string(mesh.faces[f][i] + 1);
@@ -164,7 +200,7 @@ void write_mesh(const std::filesystem::path& file, const Mesh& mesh) {
   require_opaque(mesh, "mesh for " + file.string());
   if (extension == ".obj") {
     const std::string text = obj_text(file, mesh);
-    if (!mesh.textures.empty()) write_obj_materials(file, mesh);
+    if (has_library(mesh)) write_obj_materials(file, mesh);
     write_whole_file(file, text);
   }
   if (extension == ".ply") write_whole_file(file, ply_text(mesh));

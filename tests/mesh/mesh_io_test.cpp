@@ -371,6 +371,37 @@ TEST_SUITE("unit") {
     CHECK(folder.entries() == 1);
   }
 
+  TEST_CASE("OBJ: materials are written and read back") {
+    const TempDir folder;
+    Mesh mesh = make_icosphere(0);
+    mesh.materials = {{{0.25F, 0, 3}, 40}};
+    write_mesh(folder / "one.obj", mesh);
+    Mesh back = read_mesh(folder / "one.obj");
+    CHECK(back.materials == mesh.materials);
+    CHECK(back.face_materials.empty());
+    CHECK(back.vertex_colors == mesh.vertex_colors);
+
+    mesh.materials = {{{0.1F, 0.2F, 0.3F}, {}}, {{0, 0, 0}, 1.5F}};
+    mesh.face_materials.assign(mesh.faces.size(), 0);
+    mesh.face_materials[1] = mesh.face_materials[3] = 1;
+    mesh.texcoords = {{0, 0}, {1, 0}, {0, 1}};
+    mesh.face_texcoords.assign(mesh.faces.size(), {0, 1, 2});
+    mesh.textures = {{1, 1, {{0, 1, 0}}, Wrap::clamp}};
+    mesh.face_textures.assign(mesh.faces.size(), 0);
+    mesh.face_textures[3] = k_no_texture;
+    write_mesh(folder / "two.obj", mesh);
+    back = read_mesh(folder / "two.obj");
+    CHECK(back.materials == mesh.materials);
+    CHECK(back.face_materials == mesh.face_materials);
+    CHECK(back.face_textures == mesh.face_textures);
+    REQUIRE(back.textures.size() == 1);
+    CHECK(back.textures[0].wrap == Wrap::clamp);
+
+    mesh.materials[0].specular.x = -1;
+    DPR_CHECK_MESSAGE_HAS(IoError, write_mesh(folder / "three.obj", mesh), "no highlights below 0");
+    CHECK(folder.entries() == 5);
+  }
+
   TEST_CASE("PLY: written and read back; colours in bytes") {
     const TempDir folder;
     Mesh mesh = make_cube();
