@@ -29,10 +29,10 @@ void take_projection(const JsonNode& node, Camera& camera) {
       node.fail("orthographic_height without orthographic projection", "\"projection\": \"orthographic\"");
     return;
   }
+  camera.orthographic_height = node.at("orthographic_height").number();
   for (const char* const key : {"fov_y_degrees", "intrinsics", "distortion", "fisheye"}) {
     if (node.find(key)) node.fail(std::string(key) + " and an orthographic projection", "one of the two");
   }
-  camera.orthographic_height = node.at("orthographic_height").number();
 }
 
 }  // namespace

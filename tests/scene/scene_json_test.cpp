@@ -375,6 +375,8 @@ TEST_SUITE("robustness") {
           "got fov_y_degrees and intrinsics");
     check(with(R"("camera": {"projection": "fisheye"})"), "got \"fisheye\", expected perspective or");
     check(with(R"("camera": {"projection": "orthographic"})"), "got no key \"orthographic_height\"");
+    check(with(R"("camera": {"projection": "orthographic", "fov_y_degrees": 9})"),
+          "got no key \"orthographic_height\"");
     check(with(R"("camera": {"orthographic_height": 1})"), "got orthographic_height without");
     check(with(R"("camera": {"projection": "orthographic", "orthographic_height": 1, "fov_y_degrees": 9})"),
           "got fov_y_degrees and an orthographic projection");
