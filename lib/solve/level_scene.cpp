@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "mesh/cluster_vertices.hpp"
+#include "mesh/opacity.hpp"
+#include "mesh/solid.hpp"
 #include "scene/gradient_table.hpp"
 #include "solve/resample.hpp"
 
@@ -82,6 +84,21 @@ void simplify(Scene& scene, const std::vector<Seen>& seen) {
   }
 }
 
+/// The sides of faces that no sharp image shows: those inside solids, where all wind alike. None where a mesh is open
+/// or seen through.
+Cull inner_sides(const Scene& scene) {
+  int winding = 0;
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    const Mesh& mesh = mesh_of(scene, i);
+    const Solid solid(make_edges(mesh.faces, mesh.positions.size()), mesh.faces.size());
+    const bool is_mirrored = glm::determinant(glm::dmat3(glm::dmat4(scene.meshes[i].transform))) < 0;
+    const int own = (is_mirrored ? -1 : 1) * solid.winding(mesh.positions, mesh.faces);
+    if (own == 0 || own == -winding || is_see_through(mesh)) return Cull::none;
+    winding = own;
+  }
+  return winding > 0 ? Cull::back : Cull::front;
+}
+
 /// Least side of a mesh's triangle of mean area, in pixels.
 double side_in_pixels(const Scene& scene, const std::vector<Seen>& seen) {
   double least = std::numeric_limits<double>::infinity();
@@ -126,6 +143,10 @@ Scene level_scene(const Scene& scene, const PoseSpace& space, const LeastSquares
   result.camera = resample(scene.camera, scene.width, scene.height, result.width, result.height);
   const std::vector<Seen> seen = seen_meshes(scene, space);
   // The answer comes from the meshes and the textures themselves.
+  const bool is_last = shape.short_side == full && shape.blur <= options.blur_end;
+  // Images of depths without the far sides lose some of a solid's equal poses.
+  const bool shows_depths = !options.depth.image.pixels.empty();
+  if (!is_last && !shows_depths && scene.cull == Cull::none) result.cull = inner_sides(scene);
   if (shape.short_side < full) simplify(result, seen);
   result.smoothing = level_smoothing(result, space, seen, options, shape.blur);
   result.gradients = no_gradients();

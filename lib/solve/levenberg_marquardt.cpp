@@ -83,12 +83,14 @@ void judge(Candidate& candidate, const Hypothesis& hypothesis, const NormalEquat
   }
 }
 
-/// True if the candidate need not go on after a step that took `fall` off its loss: little is to be gained, or at this
-/// pace it would not reach the `least` loss of all.
-bool is_done(const Candidate& candidate, double fall, double least) {
-  const double loss = candidate.equations.loss;
-  return std::abs(fall) < (fall > 0 ? k_little_gain : k_little_loss) * loss ||
-         (fall > 0 && loss - k_steps_to_best * fall > least);
+/// True if a candidate would not reach the `least` loss of all at the pace of a step that took `fall` off its own.
+bool is_behind(const Candidate& candidate, double fall, double least) {
+  return fall > 0 && candidate.equations.loss - k_steps_to_best * fall > least;
+}
+
+/// True if little is to be gained after a step that took `fall` off the loss.
+bool is_settled(const Candidate& candidate, double fall) {
+  return std::abs(fall) < (fall > 0 ? k_little_gain : k_little_loss) * candidate.equations.loss;
 }
 
 /// Linearizes the candidates that came from another level.
@@ -167,8 +169,9 @@ std::vector<double> covariance(const NormalEquations& equations, std::size_t par
 
 bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& candidates, const Turns& turns,
             const std::function<bool()>& report) {
-  // A robust loss is mostly what it has given up on: its parts say little.
-  const bool is_squared = level.color_scale() == 0 && !level.has_observations();
+  // Of observations the best pose is not the only one that counts. A robust loss is mostly what it has given up on: its
+  // parts say little.
+  const bool counts_best = !level.has_observations(), is_squared = counts_best && level.color_scale() == 0;
   linearize(level, candidates);
   std::vector<double> losses;
   for (unsigned iteration = 0; iteration < turns.most; ++iteration) {
@@ -195,7 +198,8 @@ bool refine(PoseLevel& level, const PoseSpace& space, std::vector<Candidate>& ca
     for (std::size_t i = 0; i < moving.size(); ++i) {
       const double fall = moving[i]->equations.loss - equations[i].loss;
       judge(*moving[i], hypotheses[i], equations[i]);
-      moving[i]->is_still = is_squared && is_done(*moving[i], fall, losses.back());
+      moving[i]->is_still = (counts_best && is_behind(*moving[i], fall, losses.back())) ||
+                            (is_squared && is_settled(*moving[i], fall));
     }
   }
   return true;

@@ -55,9 +55,10 @@ class Fit {
   void add_others(PoseLevel& level, const std::vector<Candidate>& found);
   void add_initial();
   PoseLevel make_level(const LevelShape& shape, PoseLight light) const;
+  void choose_light(const LevelShape& shape);
   void choose_normals(const LevelShape& shape);
   LevelShape final_shape(LevelShape shape) const;
-  bool is_unexplained(PoseLevel& level, const LevelShape& shape) const;
+  bool is_unexplained(PoseLevel& level, const LevelShape& shape, bool is_finest) const;
   bool fills_picture(double uncovered, double blank) const;
   float light_gain(PoseLevel& level, const LevelShape& shape) const;
   void rescale(PoseLevel& level);
@@ -102,6 +103,7 @@ FittedPose Fit::run() {
   if (const std::optional<Found> found = descend(shapes, {}); found && goes_on_) {
     light_ = light_wanted_;
     descend(shapes, *found);
+    choose_light(shapes[shapes.size() - 2]);
     choose_normals(shapes[shapes.size() - 2]);
   }
   const LevelShape finest = final_shape(shapes.back());
@@ -160,8 +162,7 @@ std::optional<Fit::Found> Fit::descend(const std::vector<LevelShape>& shapes, co
     if (i > 0 && light_ != PoseLight::fixed) add_others(level, i == found.level ? found.candidates : none);
     work(level, most_at(beam_, i + 1));
     if (!goes_on_ || light_ != PoseLight::fixed || light_wanted_ == PoseLight::fixed) continue;
-    constexpr float k_better = 0.7F;
-    if (is_finest ? light_gain(level, shapes[i]) < k_better : i > 0 && is_unexplained(level, shapes[i]))
+    if ((i > 0 || is_finest) && is_unexplained(level, shapes[i], is_finest))
       return Found{std::move(candidates_), i};
   }
   return std::nullopt;
@@ -214,15 +215,19 @@ PoseLevel Fit::make_level(const LevelShape& shape, PoseLight light) const {
   return PoseLevel(device_, pictures_, space_, shape, light, normals_, rotation);
 }
 
-/// True if a further search in the scene's own light is in vain. A robust loss cannot tell.
-bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape) const {
+/// True if the search should go on in another light than the scene's.
+bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape, bool is_finest) const {
   constexpr double k_unexplained = 0.2, k_doubtful = 0.1;  // of what a wrong pose leaves
-  constexpr float k_much_better = 0.5F;
-  if (method_.robust) return false;
-  // Losses of levels whose observations differ in weight do not compare.
-  if (level.has_observations()) return light_gain(level, shape) < k_much_better;
-  const double part = candidates_.front().equations.loss / wrong_;
-  return part > k_unexplained || (part > k_doubtful && light_gain(level, shape) < k_much_better);
+  constexpr float k_better = 0.7F, k_much_better = 0.5F;
+  // A robust loss cannot tell, and losses of levels whose observations differ in weight do not compare.
+  if (!method_.robust && !level.has_observations()) {
+    const double part = candidates_.front().equations.loss / wrong_;
+    if (part > (is_finest ? k_doubtful : k_unexplained)) return true;
+    if (!is_finest && part <= k_doubtful) return false;
+  } else if (method_.robust && !is_finest) {
+    return false;
+  }
+  return light_gain(level, shape) < (is_finest ? k_better : k_much_better);
 }
 
 /// Residual of most of the object in a light of its own, relative to the residual in the scene's light.
@@ -231,6 +236,13 @@ float Fit::light_gain(PoseLevel& level, const LevelShape& shape) const {
   level.estimate_scale(hypotheses());
   lit.estimate_scale(hypotheses());
   return level.color_scale() > 0 ? lit.color_scale() / level.color_scale() : 1;
+}
+
+/// The scene's light, unless the other one leaves less.
+void Fit::choose_light(const LevelShape& shape) {
+  constexpr float k_less = 0.9F;
+  PoseLevel level = make_level(shape, PoseLight::fixed);
+  if (light_gain(level, shape) >= k_less) light_ = PoseLight::fixed;
 }
 
 /// Other software shades the faces at a sharp edge apart, or as one surface: whichever explains the target
