@@ -64,6 +64,24 @@ kernel void gather_corners(const FrameParams p, const uint targets, const uint s
   grad[i] = (float4)(sum, 0.0f);
 }
 
+/// Sums of targets whose corners gather_corners has summed in parts, in order. One work-item per (view, target), or per
+/// target of summed views.
+/// in   sums, targets, parts  how many: with every view's, in a view
+/// in   part_starts  uint[target + 1]
+/// in   partial      float4[view][part]
+/// out  grad         float4[view][target]
+kernel void gather_parts(const uint sums, const uint targets, const uint parts,
+                         global const uint* restrict part_starts, global const float4* restrict partial,
+                         global float4* restrict grad) {
+  const uint i = (uint)get_global_id(0);
+  if (i >= sums) return;
+  const uint view = i / targets, target = i - view * targets;
+  float4 sum = (float4)(0.0f);
+  for (uint part = part_starts[target]; part < part_starts[target + 1]; ++part)
+    sum += partial[(size_t)view * parts + part];
+  grad[i] = sum;
+}
+
 /// The same of faces, in an order that brings together those of one material; the views are added up. One
 /// work-item per place of `faces`.
 /// in   pair_starts, face_pairs  as gather_corners

@@ -27,19 +27,30 @@ void Gather::over_views(const shared::FrameParams& p, std::size_t targets, const
 
 void Gather::corners(const shared::FrameParams& p, std::size_t targets, std::size_t sums, const Bin& bin,
                      const Incidence& incidence, const PairSums& partial, Buffer<cl_float4>& grad) {
+  const std::size_t parts = incidence.part_count, gathered = parts > 0 ? parts : targets;
+  Buffer<cl_float4>& out = parts > 0 ? parts_ : grad;
   grad.resize(device_, sums);
+  out.resize(device_, sums / targets * gathered);
   sum_chunks(p, bin, k_corner_channels, partial);
-  launch_(sums, kernel::gather_corners{.p = by_rows(p),
-                                       .targets = to_uint(targets),
-                                       .sum_views = cl_uint{sums == targets},
-                                       .pair_starts = bin.pair_starts,
-                                       .face_pairs = bin.face_pairs,
-                                       .corner_starts = incidence.starts,
-                                       .corners = incidence.corners,
-                                       .partial = partial.values,
-                                       .first = partial.first,
-                                       .chunks = chunks_,
-                                       .grad = grad});
+  launch_(out.size(),
+          kernel::gather_corners{.p = by_rows(p),
+                                 .targets = to_uint(gathered),
+                                 .sum_views = cl_uint{sums == targets},
+                                 .pair_starts = bin.pair_starts,
+                                 .face_pairs = bin.face_pairs,
+                                 .corner_starts = parts > 0 ? incidence.part_starts : incidence.starts,
+                                 .corners = incidence.corners,
+                                 .partial = partial.values,
+                                 .first = partial.first,
+                                 .chunks = chunks_,
+                                 .grad = out});
+  if (parts == 0) return;
+  launch_(sums, kernel::gather_parts{.sums = to_uint(sums),
+                                     .targets = to_uint(targets),
+                                     .parts = to_uint(parts),
+                                     .part_starts = incidence.parts,
+                                     .partial = parts_,
+                                     .grad = grad});
 }
 
 void Gather::over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,

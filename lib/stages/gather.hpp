@@ -30,7 +30,7 @@ class Gather {
   void over_views(const shared::FrameParams& p, const Bin& bin, const SurfaceMaterials& materials,
                   const PairSums& partial, Buffer<float>& channels);
 
-  std::size_t bytes() const { return chunks_.capacity_bytes(); }
+  std::size_t bytes() const { return chunks_.capacity_bytes() + parts_.capacity_bytes(); }
 
  private:
   /// Of as many targets as by_rows() has a view: `sums`, one for each, or for each in every view.
@@ -40,8 +40,9 @@ class Gather {
   void sum_chunks(const shared::FrameParams& p, const Bin& bin, cl_uint channels, const PairSums& partial);
 
   Device::Impl& device_;
-  Launcher<kernel::gather_chunks, kernel::gather_corners, kernel::gather_faces> launch_;
-  Buffer<float> chunks_;  // [slot][channel]
+  Launcher<kernel::gather_chunks, kernel::gather_corners, kernel::gather_parts, kernel::gather_faces> launch_;
+  Buffer<float> chunks_;     // [slot][channel]
+  Buffer<cl_float4> parts_;  // [view][part], or of summed views [part]
 };
 
 }  // namespace dpr

@@ -10,6 +10,23 @@
 namespace dpr {
 namespace {
 
+/// Cuts runs of corners if some are longer than one work-item is to add.
+void add_parts(Device::Impl& device, std::span<const cl_uint> starts, Incidence& incidence) {
+  const auto is_long = [](cl_uint first, cl_uint last) { return last - first > DPR_RUN_CHUNK; };
+  if (std::ranges::adjacent_find(starts, is_long) == starts.end()) return;
+  std::vector<cl_uint> part_starts{0}, parts{0};
+  for (std::size_t target = 0; target + 1 < starts.size(); ++target) {
+    for (cl_uint first = starts[target]; first < starts[target + 1];) {
+      first = std::min(first + DPR_RUN_CHUNK, starts[target + 1]);
+      part_starts.push_back(first);
+    }
+    parts.push_back(to_uint(part_starts.size() - 1));
+  }
+  incidence.part_count = part_starts.size() - 1;
+  incidence.part_starts.upload(device, part_starts);
+  incidence.parts.upload(device, parts);
+}
+
 /// Of targets that are numbered by view: of `views` views that each have as many of the faces, [view][target].
 Incidence make_incidence(Device::Impl& device, std::span<const cl_uint4> faces, std::size_t targets,
                          std::size_t views = 1) {
@@ -30,6 +47,7 @@ Incidence make_incidence(Device::Impl& device, std::span<const cl_uint4> faces, 
   Incidence incidence;
   incidence.starts.upload(device, starts);
   incidence.corners.upload(device, corners);
+  add_parts(device, starts, incidence);
   return incidence;
 }
 
@@ -328,33 +346,25 @@ void Geometry::add_materials(Device::Impl& device, const Scene& scene) {
 }
 
 std::size_t GivenNormals::bytes() const {
-  return values.capacity_bytes() + mesh.capacity_bytes() + corners.starts.capacity_bytes() +
-         corners.corners.capacity_bytes();
+  return values.capacity_bytes() + mesh.capacity_bytes() + corners.bytes();
 }
 
 std::size_t SurfaceMaterials::bytes() const {
   return values.capacity_bytes() + faces.capacity_bytes() + starts.capacity_bytes();
 }
 
-std::size_t Opacities::bytes() const {
-  return values.capacity_bytes() + corners.starts.capacity_bytes() + corners.corners.capacity_bytes();
-}
+std::size_t Opacities::bytes() const { return values.capacity_bytes() + corners.bytes(); }
 
 std::size_t Textures::bytes() const {
   return texcoord_values.capacity_bytes() + textures.capacity_bytes() + texel_values.capacity_bytes() +
-         opacities.capacity_bytes() + texcoord_corners.starts.capacity_bytes() +
-         texcoord_corners.corners.capacity_bytes();
+         opacities.capacity_bytes() + texcoord_corners.bytes();
 }
 
 std::size_t Geometry::bytes() const {
-  std::size_t bytes = positions.capacity_bytes() + places.capacity_bytes() + vertex_mesh.capacity_bytes() +
-                      face_vertices.capacity_bytes() + color_values.capacity_bytes() +
-                      view_positions.capacity_bytes() + view_colors.capacity_bytes() + textures.bytes() +
-                      given_normals.bytes() + materials.bytes() + opacities.bytes();
-  for (const Incidence* incidence : {&vertex_corners, &color_corners_}) {
-    bytes += incidence->starts.capacity_bytes() + incidence->corners.capacity_bytes();
-  }
-  return bytes;
+  return positions.capacity_bytes() + places.capacity_bytes() + vertex_mesh.capacity_bytes() +
+         face_vertices.capacity_bytes() + color_values.capacity_bytes() + view_positions.capacity_bytes() +
+         view_colors.capacity_bytes() + textures.bytes() + given_normals.bytes() + materials.bytes() +
+         opacities.bytes() + vertex_corners.bytes() + color_corners_.bytes();
 }
 
 }  // namespace dpr

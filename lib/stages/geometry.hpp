@@ -17,6 +17,15 @@ namespace dpr {
 struct Incidence {
   Buffer<cl_uint> starts;   ///< [target + 1]
   Buffer<cl_uint> corners;  ///< [row * 3]
+  /// Where a target has more corners than one work-item is to add: runs of at most DPR_RUN_CHUNK of them, [part + 1],
+  /// and the targets' runs of these, [target + 1].
+  Buffer<cl_uint> part_starts, parts;
+  std::size_t part_count = 0;
+
+  std::size_t bytes() const {
+    return starts.capacity_bytes() + corners.capacity_bytes() + part_starts.capacity_bytes() +
+           parts.capacity_bytes();
+  }
 };
 
 /// Ranges of a mesh in the joined buffers. An instance has vertices, and as many given normals, of its own;
