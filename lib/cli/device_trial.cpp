@@ -31,19 +31,11 @@ Device open_for_trial(const std::string& name) {
   throw InvalidArgument("--trial", "'" + name + "'", "the name of a device's trial");
 }
 
-/// The longest that a kernel may take, its compilation included; DPR_TRIAL_SECONDS says otherwise.
-unsigned seconds_of_a_kernel() {
-  constexpr unsigned k_default = 300;  // a slow machine's compiler takes a minute
-  const char* const wanted = std::getenv("DPR_TRIAL_SECONDS");
-  const long seconds = wanted == nullptr ? 0 : std::strtol(wanted, nullptr, 10);
-  return seconds > 0 ? static_cast<unsigned>(seconds) : k_default;
-}
-
 }  // namespace
 
 void run_trial(const std::string& name) {
   constexpr int k_size = 128, k_frames = 3;
-  const unsigned seconds = seconds_of_a_kernel();
+  const unsigned seconds = trial_seconds();
   alarm(seconds);  // ends this process
   const Device device = open_for_trial(name);
   Device::Impl& impl = impl_of(device);

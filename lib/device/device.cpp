@@ -74,10 +74,11 @@ unsigned choose_lanes(const DeviceInfo& info, const cl::Device& device) {
   return device_info<CL_DEVICE_NATIVE_VECTOR_WIDTH_FLOAT>(device) >= 16 ? 16 : 8;
 }
 
-/// A CPU's memory is the whole machine's, and other programs' too.
+/// The memory of a CPU, or of a GPU that shares it, is the whole machine's, and other programs' too.
 std::size_t default_memory_budget(const DeviceInfo& info) {
   constexpr std::size_t k_most_of_cpu = std::size_t{1} << 30;
-  return info.type == "cpu" ? std::min(info.memory_bytes / 8, k_most_of_cpu) : info.memory_bytes / 4;
+  if (info.type == "cpu") return std::min(info.memory_bytes / 8, k_most_of_cpu);
+  return info.memory_bytes / (info.shares_host_memory ? 8 : 4);
 }
 
 std::vector<cl::Device> devices_of(const cl::Platform& platform) {
@@ -100,9 +101,24 @@ void mark_default(std::vector<FoundDevice>& found) {
   best.default_reason = reason_of_preference(best, infos);
 }
 
+/// Embedded devices may lack what every other one has.
+void require_abilities(const DeviceInfo& info, const cl::Device& device) {
+  constexpr std::size_t k_local_bytes = 24 << 10;  // sort_scatter's, the most of all kernels
+  constexpr cl_device_fp_config k_rounding = CL_FP_ROUND_TO_NEAREST | CL_FP_INF_NAN;  // exact predicates
+  const std::size_t local_bytes = device_info<CL_DEVICE_LOCAL_MEM_SIZE>(device);
+  std::string lacking;
+  if (local_bytes < k_local_bytes)
+    lacking = "whose work-groups have " + std::to_string(local_bytes) + " bytes of memory: dpr needs " +
+              std::to_string(k_local_bytes);
+  if ((device_info<CL_DEVICE_SINGLE_FP_CONFIG>(device) & k_rounding) != k_rounding)
+    lacking = "which does not round to the nearest number, or has no infinity";
+  if (!lacking.empty()) throw DeviceError(CL_DEVICE_NOT_AVAILABLE, info.name + ", " + lacking);
+}
+
 /// Kernels with barriers run in groups of DPR_GROUP, or of what the device allows. Throws DeviceError for a
 /// device on which they cannot run.
 unsigned choose_group(const DeviceInfo& info, const cl::Device& device) {
+  require_abilities(info, device);
   if (info.lanes > 1) return DPR_GROUP;  // there a work-item works alone
   const std::size_t most = device_info<CL_DEVICE_MAX_WORK_GROUP_SIZE>(device);
   if (most < DPR_LEAST_GROUP) {

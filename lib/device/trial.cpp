@@ -24,7 +24,9 @@ bool is_switched_off() {
   return wanted != nullptr && std::string_view(wanted) == "off";
 }
 
-std::string key_of(const DeviceInfo& info) { return "trial " + trial_name(info) + "\n" + device_key(info); }
+std::string key_of(const DeviceInfo& info) {
+  return "trial " + trial_name(info) + " " + std::to_string(trial_seconds()) + "\n" + device_key(info);
+}
 
 /// True if a process crashed by itself or took too long, rather than being ended by a user or for want of memory.
 bool is_failure(int signal) {
@@ -74,7 +76,8 @@ std::string describe(const DeviceInfo& info, const Ending& ending) {
                         std::to_string(info.lanes) + " lanes: its driver " +
                         (signal == SIGALRM ? "does not finish " : "ends the process at ") +
                         (ending.kernel.empty() ? std::string(k_frame_file) : ending.kernel);
-  if (signal != SIGALRM) failure += std::string(", ") + strsignal(signal);
+  failure += signal == SIGALRM ? " in " + std::to_string(trial_seconds()) + " s (DPR_TRIAL_SECONDS)"
+                               : std::string(", ") + strsignal(signal);
   if (!ending.text.empty()) failure += " (" + ending.text.substr(0, k_most_characters) + ")";
   return failure;
 }
@@ -83,6 +86,13 @@ std::string describe(const DeviceInfo& info, const Ending& ending) {
 
 std::string trial_name(const DeviceInfo& info) {
   return hash_text(device_key(info) + program_source(k_frame_file));
+}
+
+unsigned trial_seconds() {
+  constexpr unsigned k_default = 300;  // a slow machine's compiler takes a minute
+  const char* const wanted = std::getenv("DPR_TRIAL_SECONDS");
+  const long seconds = wanted == nullptr ? 0 : std::strtol(wanted, nullptr, 10);
+  return seconds > 0 ? static_cast<unsigned>(seconds) : k_default;
 }
 
 std::optional<Trial> remembered_trial(const DeviceInfo& info, const Store& store) {

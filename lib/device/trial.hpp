@@ -20,7 +20,10 @@ struct Trial {
 /// Names the device, its driver, its lanes and the kernels: what the trial's process looks for.
 std::string trial_name(const DeviceInfo& info);
 
-/// The result of an earlier trial.
+/// The longest that a kernel of a trial may take, its compilation included: DPR_TRIAL_SECONDS, or 300.
+unsigned trial_seconds();
+
+/// The result of an earlier trial that allowed as long.
 std::optional<Trial> remembered_trial(const DeviceInfo& info, const Store& store);
 
 /// The same, or that of a trial now. Nothing where trials are switched off (DPR_TRIAL=off), where there is no

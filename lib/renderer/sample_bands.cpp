@@ -47,9 +47,10 @@ std::size_t Renderer::Impl::fragment_bytes() const {
          Texels::fragment_bytes(impl_of(device));
 }
 
-/// Memory for fragments: no more of them than kernels can index.
+/// Memory for fragments: no more of them than kernels can index, or their largest buffer can hold.
 std::size_t Renderer::Impl::fragment_budget() const {
-  return std::min(device.memory_budget(), Rasterize::k_most_fragments * fragment_bytes());
+  const std::size_t fitting = impl_of(device).info.max_allocation_bytes / Rasterize::k_largest_bytes;
+  return std::min(device.memory_budget(), std::min(Rasterize::k_most_fragments, fitting) * fragment_bytes());
 }
 
 /// Device memory of a sample, forward and backward.

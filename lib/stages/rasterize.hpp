@@ -155,6 +155,8 @@ class Rasterize {
   static constexpr std::size_t k_fragment_bytes =
       3 * sizeof(cl_uint) + (DPR_PLANE_BASE + DPR_GRAD_PLANE_BASE) * sizeof(float);
   static constexpr std::size_t k_base_bytes = 6 * sizeof(float);
+  /// Of the largest of all buffers of fragments, at the most.
+  static constexpr std::size_t k_largest_bytes = (DPR_PLANE_BASE + 3) * sizeof(float);
   /// Fragments of a band whose planes kernels index by 32 bits.
   static constexpr std::size_t k_most_fragments =
       std::numeric_limits<cl_uint>::max() / (DPR_PLANE_BASE + 3) - k_widest_vector;
