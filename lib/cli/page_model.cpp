@@ -15,6 +15,7 @@
 #include "cli/page.hpp"
 #include "image/codec.hpp"
 #include "image/srgb.hpp"
+#include "mesh/face_texture.hpp"
 
 namespace dpr::cli {
 namespace {
@@ -193,9 +194,8 @@ void add_mesh(Model& model, const Mesh& mesh, const glm::mat4& transform) {
       model.colors.push_back(mesh.face_colors.empty() ? own : mesh.face_colors[face]);
     }
     model.faces.push_back(corners);
-    const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
-    model.face_textures.push_back(is_textured && texture != k_no_texture ? first_texture + texture
-                                                                         : k_no_texture);
+    const std::uint32_t texture = texture_of(mesh, face);
+    model.face_textures.push_back(texture == k_no_texture ? k_no_texture : first_texture + texture);
   }
   model.textures.insert(model.textures.end(), mesh.textures.begin(), mesh.textures.end());
 }

@@ -10,6 +10,7 @@
 #include "dpr/mesh.hpp"
 #include "dpr/notes.hpp"
 #include "image/codec.hpp"
+#include "mesh/face_texture.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/opacity.hpp"
 #include "mesh/scan_text.hpp"
@@ -33,10 +34,7 @@ struct ObjSurface {
 };
 
 ObjSurface surface_of(const Mesh& mesh, std::size_t face) {
-  ObjSurface surface;
-  if (!mesh.textures.empty()) surface.texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
-  if (!mesh.face_materials.empty()) surface.material = mesh.face_materials[face];
-  return surface;
+  return {texture_of(mesh, face), mesh.face_materials.empty() ? 0 : mesh.face_materials[face]};
 }
 
 /// Its name in an OBJ's library.

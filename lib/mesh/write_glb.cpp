@@ -8,6 +8,7 @@
 #include "dpr/error.hpp"
 #include "image/codec.hpp"
 #include "mesh/bounding_box.hpp"
+#include "mesh/face_texture.hpp"
 #include "mesh/little_endian.hpp"
 #include "mesh/mesh_reader.hpp"
 
@@ -48,8 +49,7 @@ class GlbWriter {
     std::map<Corner, std::uint32_t> numbers;
     std::vector<Corner> vertices;
     for (std::size_t f = 0; f < mesh_.faces.size(); ++f) {
-      std::uint32_t texture = mesh_.textures.empty() ? k_no_texture : 0;
-      if (!mesh_.face_textures.empty()) texture = mesh_.face_textures[f];
+      const std::uint32_t texture = texture_of(mesh_, f);
       for (int c = 0; c < 3; ++c) {
         const Corner corner{mesh_.faces[f][c], mesh_.face_texcoords.empty() ? 0 : mesh_.face_texcoords[f][c],
                             mesh_.face_normals.empty() ? 0 : mesh_.face_normals[f][c],

@@ -90,10 +90,11 @@ Cull inner_sides(const Scene& scene) {
   int winding = 0;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     const Mesh& mesh = mesh_of(scene, i);
+    if (is_see_through(mesh)) return Cull::none;
     const Solid solid(make_edges(mesh.faces, mesh.positions.size()), mesh.faces.size());
     const bool is_mirrored = glm::determinant(glm::dmat3(glm::dmat4(scene.meshes[i].transform))) < 0;
     const int own = (is_mirrored ? -1 : 1) * solid.winding(mesh.positions, mesh.faces);
-    if (own == 0 || own == -winding || is_see_through(mesh)) return Cull::none;
+    if (own == 0 || own == -winding) return Cull::none;
     winding = own;
   }
   return winding > 0 ? Cull::back : Cull::front;

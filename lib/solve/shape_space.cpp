@@ -9,6 +9,7 @@
 #include "base/checks.hpp"
 #include "dpr/texture_map.hpp"
 #include "mesh/bounding_box.hpp"
+#include "mesh/face_texture.hpp"
 #include "solve/resample.hpp"
 
 namespace dpr {
@@ -40,14 +41,16 @@ constexpr glm::vec3 k_grey(0.5F);
 /// The textures' colours of corners, [3 face + corner]; white where a face has no texture.
 std::vector<glm::vec3> texture_colors(const Mesh& mesh) {
   std::vector<glm::vec3> colors(3 * mesh.faces.size(), glm::vec3(1));
+  std::vector<std::vector<std::size_t>> corners_of(mesh.textures.size());
+  for (std::size_t i = 0; i < colors.size(); ++i) {
+    if (const std::uint32_t texture = texture_of(mesh, i / 3); texture != k_no_texture)
+      corners_of[texture].push_back(i);
+  }
   for (std::size_t t = 0; t < mesh.textures.size(); ++t) {
-    std::vector<std::size_t> corners;
+    const std::vector<std::size_t>& corners = corners_of[t];
     std::vector<float> coordinates;
-    for (std::size_t i = 0; i < colors.size(); ++i) {
-      const std::size_t face = i / 3;
-      if ((mesh.face_textures.empty() ? 0 : mesh.face_textures[face]) != t) continue;
-      const glm::vec2 uv = mesh.texcoords[mesh.face_texcoords[face][static_cast<int>(i % 3)]];
-      corners.push_back(i);
+    for (const std::size_t i : corners) {
+      const glm::vec2 uv = mesh.texcoords[mesh.face_texcoords[i / 3][static_cast<int>(i % 3)]];
       coordinates.insert(coordinates.end(), {uv.x, uv.y});
     }
     const TextureMap map(mesh.textures[t]);

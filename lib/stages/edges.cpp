@@ -5,13 +5,10 @@
 #include <bit>
 
 #include "image/texture_words.hpp"
+#include "mesh/face_texture.hpp"
 
 namespace dpr {
 namespace {
-
-std::uint32_t texture_of(const Mesh& mesh, std::uint32_t face) {
-  return mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
-}
 
 /// True if two coordinates are one place of a texture.
 bool is_same_place(const glm::vec2& a, const glm::vec2& b, Wrap wrap) {
@@ -30,7 +27,6 @@ int corner_of(const Mesh& mesh, std::uint32_t face, std::uint32_t vertex) {
 
 /// True if the texture jumps at the edge between two faces.
 bool is_seam(const Mesh& mesh, const WeldedEdge& edge) {
-  if (mesh.textures.empty()) return false;
   const std::uint32_t own = edge.face, other = *edge.other, texture = texture_of(mesh, own);
   if (texture != texture_of(mesh, other)) return true;
   if (texture == k_no_texture) return false;
@@ -93,7 +89,7 @@ shared::OpenEdge open_edge(const SeenFaces& seen, const WeldedEdge& of_seen) {
   const WeldedEdge edge = by_row(of_seen, seen);
   shared::OpenEdge open{};
   open.side = side_of(of_seen, seen.first_face);
-  open.texture = mesh.textures.empty() ? k_no_texture : texture_of(mesh, edge.face);
+  open.texture = texture_of(mesh, edge.face);
   open.material = to_uint(material_of(mesh, edge.face));
   if (seen.fades()) {
     open.texture = edge.face;  // another than any other face's: at all these edges it jumps

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "mesh/face_texture.hpp"
 #include "mesh/opacity.hpp"
 
 namespace dpr {
@@ -81,7 +82,7 @@ cl_uint4 corner_elements(const Mesh& mesh, std::size_t face, std::size_t first, 
 
 cl_uint4 corner_texcoords(const Mesh& mesh, std::size_t face, cl_uint first_texcoord, cl_uint first_texture) {
   if (mesh.textures.empty()) return {{0, 0, 0, DPR_NO_TEXTURE}};
-  const std::uint32_t texture = mesh.face_textures.empty() ? 0 : mesh.face_textures[face];
+  const std::uint32_t texture = texture_of(mesh, face);
   const glm::uvec3& f = mesh.face_texcoords[face];
   return {{first_texcoord + f.x, first_texcoord + f.y, first_texcoord + f.z,
            texture == k_no_texture ? DPR_NO_TEXTURE : first_texture + texture}};
