@@ -38,4 +38,5 @@
 #include "dpr/texture.hpp"
 #include "dpr/texture_map.hpp"
 #include "dpr/version.hpp"
+#include "dpr/vertex_normals.hpp"
 #include "dpr/voxels.hpp"

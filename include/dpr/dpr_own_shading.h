@@ -1,5 +1,5 @@
 /* The C interface, continued: shading of the caller's own, with noise on the pixel around it. dpr/dpr_frame.h includes
- * this. What is shaded on the host needs no device: dpr_interpolate() and dpr_texture_map(). */
+ * this. What is shaded on the host needs no device: dpr_interpolate(), dpr_vertex_normals() and dpr_texture_map(). */
 #ifndef DPR_DPR_OWN_SHADING_H
 #define DPR_DPR_OWN_SHADING_H
 
@@ -93,6 +93,14 @@ DPR_API dpr_status dpr_interpolate_backward(const dpr_array* arrays, size_t coun
 /* Forward mode along one direction, in which "attributes" and "barycentrics" change; of those left out, none. */
 DPR_API dpr_status dpr_interpolate_tangent(const dpr_array* arrays, size_t count, const dpr_array* tangents,
                                            size_t tangent_count, const dpr_array* values);
+
+/* Unit normals of vertices, as lights have them (dpr/vertex_normals.hpp): of float32 vertices [V, 3] or [N, V, 3] and
+ * faces [F, 3], normals of the vertices' shape. */
+DPR_API dpr_status dpr_vertex_normals(const dpr_array* arrays, size_t count, const dpr_array* normals);
+/* The gradient of sum <grad_normals, normals> by the vertices. */
+DPR_API dpr_status dpr_vertex_normals_backward(const dpr_array* arrays, size_t count,
+                                               const dpr_array* grad_normals,
+                                               const dpr_array* grad_vertices);
 
 /* Texels at places, filtered (dpr/texture_map.hpp): values [N, h, w, C]. Of float32 arrays
  *

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/checks.hpp"
+#include "mesh/vertex_normals.hpp"
 
 namespace dpr {
 namespace {
@@ -148,60 +149,18 @@ std::vector<Value> of_whole(const MeshSubdivision& subdivision, const std::vecto
                      : pulled_back(subdivision.vertices, of_pieces, subdivision.old_positions);
 }
 
-/// The sums of the normals of the faces around vertices, twice their area long.
-std::vector<glm::dvec3> normals_of_vertices(const Mesh& mesh, int sign) {
-  std::vector<glm::dvec3> normals(mesh.positions.size(), glm::dvec3(0));
-  for (const glm::uvec3& face : mesh.faces) {
-    const glm::dvec3 a(mesh.positions[face.x]), b(mesh.positions[face.y]), c(mesh.positions[face.z]);
-    for (int corner = 0; corner < 3; ++corner)
-      normals[face[corner]] += static_cast<double>(sign) * glm::cross(b - a, c - a);
-  }
-  return normals;
-}
-
-/// Adds the gradient by way of these sums to that of the positions.
-void add_by_normals(const Mesh& mesh, int sign, const std::vector<glm::dvec3>& gradient,
-                    std::vector<glm::vec3>& grad_positions) {
-  std::vector<glm::dvec3> sums(mesh.positions.size(), glm::dvec3(0));
-  for (const glm::uvec3& face : mesh.faces) {
-    const glm::dvec3 g = static_cast<double>(sign) * (gradient[face.x] + gradient[face.y] + gradient[face.z]);
-    for (int corner = 0; corner < 3; ++corner) {
-      const glm::dvec3 next(mesh.positions[face[(corner + 1) % 3]]);
-      const glm::dvec3 previous(mesh.positions[face[(corner + 2) % 3]]);
-      sums[face[corner]] += glm::cross(next - previous, g);
-    }
-  }
-  for (std::size_t i = 0; i < sums.size(); ++i) grad_positions[i] += glm::vec3(sums[i]);
-}
-
 /// The normals that are combined, of any length.
 std::vector<glm::dvec3> old_normals(const Mesh& mesh, const MeshSubdivision& subdivision) {
-  if (subdivision.computed_normals != 0) return normals_of_vertices(mesh, subdivision.computed_normals);
-  return {mesh.normals.begin(), mesh.normals.end()};
-}
-
-/// The unit vector along a normal, or 0 if the normal is 0.
-glm::dvec3 direction_of(const glm::dvec3& normal) {
-  const double length = glm::length(normal);
-  return length > 0 ? normal / length : glm::dvec3(0);
+  if (subdivision.computed_normals == 0) return {mesh.normals.begin(), mesh.normals.end()};
+  std::vector<glm::dvec3> normals = normal_sums(mesh.positions, mesh.faces);
+  for (glm::dvec3& normal : normals) normal *= subdivision.computed_normals;
+  return normals;
 }
 
 std::vector<glm::vec3> directions_of(const std::vector<glm::dvec3>& normals) {
   std::vector<glm::vec3> directions;
   for (const glm::dvec3& normal : normals) directions.emplace_back(direction_of(normal));
   return directions;
-}
-
-/// From the gradients of directions to those of the normals.
-std::vector<glm::dvec3> directions_backward(const std::vector<glm::dvec3>& normals,
-                                            const std::vector<glm::vec3>& gradient) {
-  std::vector<glm::dvec3> result;
-  for (std::size_t i = 0; i < normals.size(); ++i) {
-    const glm::dvec3 direction = direction_of(normals[i]), g(gradient[i]);
-    const double length = glm::length(normals[i]);
-    result.push_back(length > 0 ? (g - glm::dot(direction, g) * direction) / length : glm::dvec3(0));
-  }
-  return result;
 }
 
 /// One more than the last index.
@@ -306,14 +265,19 @@ MeshGradient pull_back(const Mesh& mesh, const MeshSubdivision& subdivision, con
   result.texcoords = pulled_back(subdivision.texcoords, of_pieces.texcoords, mesh.texcoords.size());
   if (of_pieces.normals.empty() || subdivision.normals.of.empty()) return result;
   const std::vector<glm::dvec3> normals = old_normals(mesh, subdivision);
-  const std::vector<glm::dvec3> grad_normals =
-      directions_backward(normals, pulled_back(subdivision.normals, of_pieces.normals, normals.size()));
+  const std::vector<glm::vec3> grad_directions =
+      pulled_back(subdivision.normals, of_pieces.normals, normals.size());
+  std::vector<glm::dvec3> grad_normals(normals.size());
+  for (std::size_t i = 0; i < normals.size(); ++i)
+    grad_normals[i] = direction_backward(normals[i], glm::dvec3(grad_directions[i]));
   if (subdivision.computed_normals == 0) {
     result.normals.assign(grad_normals.begin(), grad_normals.end());
   } else {
     result.normals.clear();
-    if (!result.positions.empty())
-      add_by_normals(mesh, subdivision.computed_normals, grad_normals, result.positions);
+    if (result.positions.empty()) return result;
+    for (glm::dvec3& grad : grad_normals) grad *= subdivision.computed_normals;
+    const std::vector<glm::dvec3> added = normal_sums_backward(mesh.positions, mesh.faces, grad_normals);
+    for (std::size_t i = 0; i < added.size(); ++i) result.positions[i] += glm::vec3(added[i]);
   }
   return result;
 }

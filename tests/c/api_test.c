@@ -1182,6 +1182,28 @@ static void test_own_texture(void) {
   dpr_frame_destroy(frame);
 }
 
+/* Of two shapes, one of them the other way round: a square's corner is moved along its normal. */
+static void test_vertex_normals(void) {
+  float vertices[24] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0}, normals[24], grad[24] = {0}, by_vertices[24];
+  int faces[] = {0, 1, 2, 0, 2, 3}, i;
+  dpr_array arrays[] = {{"vertices", vertices, DPR_FLOAT32, 3, {2, 4, 3}},
+                        {"faces", faces, DPR_INT32, 2, {2, 3}}};
+  const dpr_array of_normals = {"normals", normals, DPR_FLOAT32, 3, {2, 4, 3}};
+  const dpr_array grad_normals = {"normals", grad, DPR_FLOAT32, 3, {2, 4, 3}};
+  const dpr_array grad_vertices = {"vertices", by_vertices, DPR_FLOAT32, 3, {2, 4, 3}};
+  for (i = 0; i < 12; ++i) vertices[12 + i] = (i % 3 == 0 ? -1.0f : 1.0f) * vertices[i];
+  OK(dpr_vertex_normals(arrays, 2, &of_normals));
+  for (i = 0; i < 24; ++i) EXPECT(normals[i] == (i % 3 != 2 ? 0 : i < 12 ? 1.0f : -1.0f));
+  grad[3] = grad[15] = 1; /* x of vertex 1, of the first face alone, whose normal is 4 long */
+  OK(dpr_vertex_normals_backward(arrays, 2, &grad_normals, &grad_vertices));
+  EXPECT(by_vertices[2] == 0.5f && by_vertices[5] == -0.5f && by_vertices[8] == 0 && by_vertices[11] == 0);
+  EXPECT(by_vertices[14] == 0.5f && by_vertices[17] == -0.5f);
+  faces[5] = 4;
+  REFUSED(dpr_vertex_normals(arrays, 2, &of_normals), "indices below 4");
+  arrays[1].name = "face";
+  REFUSED(dpr_vertex_normals(arrays, 2, &of_normals), "vertices or faces");
+}
+
 /* What nvdiffrast calls rast and rast_db, of a frame of one triangle: by the interpolation of z and w, and of u and v. */
 static void check_rast(dpr_frame* frame, const dpr_array* given, const float* positions) {
   static float rast[FLOATS], rast_db[FLOATS], values[FLOATS], steps[2 * FLOATS], of_rast[FLOATS],
@@ -2077,6 +2099,7 @@ int main(void) {
   test_frame_samples();
   test_frame_layers();
   test_own_texture();
+  test_vertex_normals();
   test_clip_space();
   test_setters(device);
   test_mesh_loss(device, scene);

@@ -226,6 +226,29 @@ class SurfaceTest(unittest.TestCase):
         lonely = shading.vertex_normals(torch.cat((self.SQUARE, torch.ones(1, 3))), self.FACES)
         self.assertEqual(lonely[4].abs().max(), 0)
 
+    def test_derivatives_of_normals(self):
+        """The library's, beside those of PyTorch's operations: of doubles, along directions, and of gradients themselves."""
+        def normals(vertices):
+            return shading.vertex_normals(vertices, self.FACES)
+
+        def by(vertices):
+            vertices = vertices.clone().requires_grad_()
+            grad, = torch.autograd.grad((normals(vertices) * weights.to(vertices)).sum(), vertices, create_graph=True)
+            return grad, *torch.autograd.grad((grad * moved.to(vertices)).sum(), vertices)
+
+        vertices, weights, moved = (torch.stack((self.SQUARE, self.SQUARE.flip(-1))) + random(2, 4, 3, seed=seed) for seed in range(3))
+        exact, again = by(vertices.double())
+        for found, wanted in zip(by(vertices), (exact, again)):
+            torch.testing.assert_close(found, wanted.float(), rtol=1e-5, atol=1e-6)
+        leaf = vertices.clone().requires_grad_()
+        (normals(leaf) * weights).sum().backward()
+        torch.testing.assert_close(leaf.grad, exact.float(), rtol=1e-5, atol=1e-6)
+        _, along = torch.autograd.functional.jvp(normals, vertices.double(), moved.double())
+        torch.testing.assert_close((along * weights).sum(), (exact * moved).sum())
+        self.assertTrue(normals(vertices * 1e-8).norm(dim=-1).allclose(torch.ones(())))
+        with self.assertRaisesRegex(ValueError, r"faces\[0\].*indices below 2"):
+            shading.vertex_normals(vertices[0, :2], self.FACES)
+
     def test_tangents(self):
         texcoords = self.SQUARE[:, :2].clone()
         normal = torch.tensor([0.0, 0, 1])

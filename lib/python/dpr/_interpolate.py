@@ -52,7 +52,7 @@ class _Covered(torch.autograd.Function):
         return (None, None, None, torch.from_numpy(of_attributes), *of_tensors)
 
 
-def _is_transformed(*tensors):
+def is_transformed(*tensors):
     """Within torch.func, or with tangents: the library knows nothing of these."""
     peek = getattr(getattr(torch._C, "_functorch", None), "peek_interpreter_stack", None)
     return peek is not None and peek() is not None or \
@@ -60,12 +60,12 @@ def _is_transformed(*tensors):
 
 
 def interpolate(face_id, barycentrics, attributes, faces, mixed):
-    if _is_transformed(barycentrics, attributes):
+    if is_transformed(barycentrics, attributes):
         return mixed(barycentrics, attributes, faces)
     return _Interpolate.apply(mixed, face_id, barycentrics, attributes, faces)
 
 
 def interpolate_covered(rasterized, mixed, faces, attributes, tensors):
-    if _is_transformed(attributes, *tensors):
+    if is_transformed(attributes, *tensors):
         return mixed(attributes)
     return _Covered.apply(rasterized, mixed, faces, attributes, *tensors)

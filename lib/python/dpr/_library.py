@@ -105,6 +105,8 @@ _SIGNATURES = {
     "dpr_clip_space_create": [ctypes.c_int, ctypes.c_int, *_ARRAYS, ctypes.POINTER(_HANDLE)],
     "dpr_clip_space_size": [_HANDLE, ctypes.POINTER(_SIZE), ctypes.POINTER(_SIZE)],
     "dpr_clip_space_read": [_HANDLE, *_ARRAYS],
+    "dpr_vertex_normals": [*_ARRAYS, ctypes.POINTER(Array)],
+    "dpr_vertex_normals_backward": [*_ARRAYS, *[ctypes.POINTER(Array)] * 2],
     "dpr_texture_map": [*_ARRAYS, *[ctypes.c_char_p] * 2, ctypes.POINTER(Array)],
     "dpr_texture_map_backward": [*_ARRAYS, *[ctypes.c_char_p] * 2, ctypes.POINTER(Array), *_ARRAYS],
     "dpr_texture_map_tangent": [*_ARRAYS, *[ctypes.c_char_p] * 2, *_ARRAYS, ctypes.POINTER(Array)],

@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from . import _arrays
+from . import _arrays, _vertex_normals as _normals
 from ._losses import sum_at
 from ._renderer import Renderer
 from ._texture import texture as _texture
@@ -61,17 +61,21 @@ def _gathered(of_corners, indices, count):
     return sum_at(of_corners.flatten(-3, -2), indices.reshape(-1), count)
 
 
-def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
-    """Unit normals of vertices [V, 3] or [N, V, 3]: means of the faces' [F, 3], weighted by area, as the renderer's lights
-    have them. 0 where a vertex has no face with area."""
-    _require("vertices", vertices, (3,), "[V, 3] or [N, V, 3]")
-    _require("faces", faces, (3,), "[F, 3]")
+def _vertex_normals(vertices, faces):
     corners = faces.long().T.contiguous()
     a, b, c = (vertices.index_select(-2, corner) for corner in corners)
     normals, sums = torch.cross(b - a, c - a, -1), torch.zeros_like(vertices)
     for corner in corners:
         sums = sums.index_add(-2, corner, normals)
     return unit(sums)
+
+
+def vertex_normals(vertices: Tensor, faces: Tensor) -> Tensor:
+    """Unit normals of vertices [V, 3] or [N, V, 3]: means of the faces' [F, 3], weighted by area, as the renderer's lights
+    have them. 0 where a vertex has no face with area."""
+    _require("vertices", vertices, (3,), "[V, 3] or [N, V, 3]")
+    _require("faces", faces, (3,), "[F, 3]")
+    return _normals.vertex_normals(_vertex_normals, vertices, faces)
 
 
 def vertex_tangents(vertices: Tensor, faces: Tensor, texcoords: Tensor, face_texcoords: Optional[Tensor] = None) -> Tensor:
