@@ -10,6 +10,7 @@
 #include "solve/level_scene.hpp"
 #include "solve/pose_pyramid.hpp"
 #include "solve/resample.hpp"
+#include "solve/target_noise.hpp"
 #include "solve/unknown_background.hpp"
 
 namespace dpr {
@@ -330,6 +331,7 @@ double PictureLevel::blank_loss() {
 LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
   const bool counts_depths = counts_colors_ && depths_;
   LossParts parts;
+  parts.noise = noise_loss(hypothesis);
   if (!has_unknown_background_ && !counts_depths) return parts;
   const HypothesisImages images = render({&hypothesis, 1});
   const double loss = sums_->measured_loss(images, scales_.measured);
@@ -350,6 +352,17 @@ LossParts PictureLevel::loss_parts(const Hypothesis& hypothesis) {
     parts.matched = std::min(loss - others, k_matched * (sums_->measured_loss(images, most) - others));
   }
   return parts;
+}
+
+double PictureLevel::noise_loss(const Hypothesis& hypothesis) {
+  if (!counts_colors_ || has_unknown_background_ || scales_.color > 0) return 0;
+  const std::vector<cl_float4> picture = render({&hypothesis, 1}).colors.download();
+  const TargetNoise noise =
+      noise_of(target_.colors, picture, static_cast<std::size_t>(width()), target_.background);
+  double sum = 0;
+  for (std::size_t i = 0; i < picture.size(); ++i)
+    sum += static_cast<double>(target_.weights[i]) * (picture[i].s[3] > 0 ? noise.covered : noise.uncovered);
+  return sum / sums_->total();
 }
 
 }  // namespace dpr

@@ -27,8 +27,11 @@ struct PictureImages {
 struct LossParts {
   double uncovered = 0;  ///< of pixels that it does not cover; 0 where the background is known
   double matched = 0;    ///< of depths that match, beside colours
+  double noise = 0;      ///< of the target, where the background is known and losses are squares
 
-  double sum() const { return uncovered + matched; }
+  /// Those that any other hypothesis has too.
+  double common() const { return uncovered + noise; }
+  double sum() const { return common() + matched; }
 };
 
 class PictureLevel {
@@ -100,6 +103,8 @@ class PictureLevel {
   void resample_images(const PictureImages& images);
   /// What was observed beside colours, at the level's size.
   std::vector<cl_float4> measured(const PictureImages& images) const;
+  /// LossParts::noise
+  double noise_loss(const Hypothesis& hypothesis);
   /// Images of hypotheses; what they show already is not rendered again.
   HypothesisImages render(std::span<const Hypothesis> hypotheses);
   /// The same beside their tangents.

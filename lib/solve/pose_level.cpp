@@ -110,6 +110,7 @@ LossParts PoseLevel::loss_parts(const Hypothesis& hypothesis) {
     const LossParts own = picture.loss_parts(hypothesis);
     mean.uncovered += own.uncovered / count;
     mean.matched += own.matched / count;
+    mean.noise += own.noise / count;
   }
   return mean;
 }
@@ -118,7 +119,7 @@ std::vector<double> PoseLevel::blank_parts(const Hypothesis& hypothesis) {
   std::vector<double> result;
   for (PictureLevel& picture : pictures_) {
     const LossParts parts = picture.loss_parts(hypothesis);
-    const double blank = picture.blank_loss() - parts.uncovered;
+    const double blank = picture.blank_loss() - parts.common();
     result.push_back(blank > 0 ? (picture.losses({&hypothesis, 1}).front() - parts.sum()) / blank : 1);
   }
   return result;

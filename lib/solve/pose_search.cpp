@@ -126,8 +126,8 @@ FittedPose Fit::run() {
                unexplained = method_.unknown_background ? blank : std::min(wrong_, blank);
   const bool is_robust = method_.robust || (!has_colors_ && !method_.depth.image.pixels.empty());
   if (pictures_.size() > 1) result_.view_parts = level.blank_parts(candidates_.front().hypothesis);
-  if (unexplained - parts.uncovered > k_least_covered * unexplained)
-    result_.unexplained_part = (result_.loss - parts.sum()) / (unexplained - parts.uncovered);
+  if (unexplained - parts.common() > k_least_covered * unexplained)
+    result_.unexplained_part = std::max(result_.loss - parts.sum(), 0.0) / (unexplained - parts.common());
   if (!fills_picture(parts.uncovered, blank) &&
       result_.unexplained_part < explained_part(options_.explained, is_robust)) {
     result_.doubt = is_doubted ? PoseDoubt::other_pose : PoseDoubt::none;
@@ -221,7 +221,9 @@ bool Fit::is_unexplained(PoseLevel& level, const LevelShape& shape, bool is_fine
   constexpr float k_better = 0.7F, k_much_better = 0.5F;
   // A robust loss cannot tell, and losses of levels whose observations differ in weight do not compare.
   if (!method_.robust && !level.has_observations()) {
-    const double part = candidates_.front().equations.loss / wrong_;
+    const Candidate& best = candidates_.front();
+    const double noise = level.loss_parts(best.hypothesis).noise;
+    const double part = (best.equations.loss - noise) / (wrong_ - noise);
     if (part > (is_finest ? k_doubtful : k_unexplained)) return true;
     if (!is_finest && part <= k_doubtful) return false;
   } else if (method_.robust && !is_finest) {

@@ -90,7 +90,7 @@ struct PoseTracker::Impl {
   double explained_below(const Hypothesis& hypothesis) {
     const double unexplained = levels->unexplained(levels->size() - 1);
     const LossParts parts = levels->finest().loss_parts(hypothesis);
-    const double covered = unexplained - parts.uncovered;
+    const double covered = unexplained - parts.common();
     if (covered <= k_least_covered * unexplained) return 0;
     return parts.sum() + explained_part(options.explained, options.method.robust) * covered;
   }

@@ -1,9 +1,11 @@
 // When a pose counts as explaining its target.
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <glm/gtc/matrix_transform.hpp>
+#include <random>
 #include <string>
 
 #include "dpr/dpr.hpp"
@@ -73,6 +75,28 @@ TEST_SUITE("pipeline") {
       const dpr::Image target = dpr::read_image(folder / picture);
       const dpr::PoseResult result = dpr::PoseSolver(device, scene, target, {.method = method}).search();
       CHECK(result.explained == (std::string(picture) == "spot01.exr"));
+    }
+  }
+
+  TEST_CASE("noise is no reason to doubt a pose, nor to take one for right") {
+    if (dpr::test::is_reduced()) return;
+    const dpr::Device device = dpr::open_device();
+    const auto folder = dpr::test::data_folder() / "foreign";
+    const dpr::Scene scene = dpr::read_scene(folder / "spot.json");
+    for (const std::string picture : {"spot01.exr", "fish00.exr", "no object"}) {
+      CAPTURE(picture);
+      const bool is_empty = picture == "no object";
+      dpr::Image target =
+          is_empty ? dpr::Image(scene.width, scene.height) : dpr::read_image(folder / picture);
+      std::mt19937 random(5);
+      std::normal_distribution<float> noise(0, 0.05F);
+      for (glm::vec4& p : target.pixels)
+        for (int channel = 0; channel < 3; ++channel) p[channel] = std::max(p[channel] + noise(random), 0.0F);
+      const dpr::PoseResult result =
+          dpr::PoseSolver(device, scene, target, {.method = dpr::LeastSquares{}}).search();
+      CHECK(result.explained == (picture == "spot01.exr"));
+      CHECK(result.unexplained_part >= 0);
+      if (!result.explained) CHECK(result.unexplained_part > 0.3);
     }
   }
 }
