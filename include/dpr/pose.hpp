@@ -106,8 +106,9 @@ struct LeastSquares {
   /// with an alpha of 0, or whose depth is 0 or not finite, have none. Depths are compared where both are, by a robust
   /// loss whose scale is four standard deviations. Without colours and silhouette depths of the object alone (no more
   /// pixels have one than the object could cover where it begins, nor further from there along the axis than its
-  /// radius or, with a translation to look for, its diameter) are a silhouette too, robustly compared. Depths of a
-  /// whole scene, in which objects may shrink to fit anywhere, need colours or a silhouette beside them.
+  /// radius; with a translation to look for, than its diameter from their median) are a silhouette too, robustly
+  /// compared. Depths of a whole scene, in which objects may shrink to fit anywhere, need colours or a silhouette beside
+  /// them; a search refuses them alone.
   PoseObservation depth;
 };
 

@@ -76,6 +76,23 @@ std::optional<PoseBox> extent_of_target(const PoseProblem& problem) {
   return extent_before(problem.target, scene.background);
 }
 
+/// Of depths, where nothing else is compared. Throws where they are not the object's alone: it would fit anywhere.
+std::optional<PoseBox> extent_of_depths(const PoseProblem& problem, const Pose& initial) {
+  const LeastSquares& method = method_of(problem.options);
+  Image depths = method.depth.image;
+  if (depths.pixels.empty() || !problem.target.pixels.empty() || !method.silhouette.image.pixels.empty() ||
+      problem.scene.camera.orthographic_height)
+    return {};
+  const PoseSpace space(problem.scene, initial, problem.options);
+  if (!space.body().is_alone()) return {};
+  if (!space.may_cover(depths)) {
+    throw InvalidArgument("depth (pose)", "depths of more than the object",
+                          "those of the object alone, or a silhouette or colours beside them");
+  }
+  for (glm::vec4& p : depths.pixels) p.x = has_depth(p) ? 1 : 0;
+  return extent(depths);
+}
+
 /// Boxes of an object of which the picture shows what is in the box, further on beyond the sides that it touches.
 std::vector<PoseBox> grown_beyond(const PoseBox& box, const Scene& scene) {
   const glm::vec2 picture(scene.width, scene.height), low(box.x, box.y), size(box.width, box.height),
@@ -153,10 +170,12 @@ PosePlaces::PosePlaces(const PoseProblem& problem, const Pose& initial, bool any
   const LeastSquares& method = method_of(options);
   const PoseBody body(scene_, options.meshes);
   for (const glm::dvec3& p : body.points(scene_)) radius_ = std::max(radius_, glm::length(p));
+  const std::optional<PoseBox> of_depths = anywhere ? extent_of_depths(problem, initial) : std::nullopt;
   if (!options.solve_translation) return;
   std::optional<PoseBox> box = box_of_search(options, anywhere);
-  const bool is_silhouette = !method.silhouette.image.pixels.empty();
+  const bool is_silhouette = of_depths || !method.silhouette.image.pixels.empty();
   is_mask_ = box && !method.box && !is_silhouette;
+  if (!box) box = of_depths;
   if (!box && anywhere) {
     box = extent_of_target(problem);
     if (box) {

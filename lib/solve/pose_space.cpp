@@ -149,15 +149,19 @@ Hypothesis PoseSpace::absent(const Camera& camera) const {
 }
 
 bool PoseSpace::may_cover(const Image& depths) const {
-  const double reach = translation_ ? 2 * radius_ : radius_;
-  const double radius = radius_ndc_ * std::min(depths.width, depths.height) / 2;
-  double count = 0;
-  for (const glm::vec4& p : depths.pixels) {
-    if (!(p.w > 0)) continue;
-    if (std::abs(static_cast<double>(p.x) - distance_) > reach) return false;
-    ++count;
-  }
-  return count <= std::numbers::pi * radius * radius;
+  constexpr double k_stray = 0.05;  // of a sensor's pixels
+  std::vector<double> known;
+  for (const glm::vec4& p : depths.pixels)
+    if (has_depth(p)) known.push_back(static_cast<double>(p.x));
+  if (known.empty()) return true;
+  const auto middle = known.begin() + std::ssize(known) / 2;
+  std::ranges::nth_element(known, middle);
+  const double distance = translation_ ? *middle : distance_, reach = translation_ ? 2 * radius_ : radius_;
+  const double radius = radius_ndc_ / relative_distance(distance) * std::min(depths.width, depths.height) / 2;
+  const auto further =
+      std::ranges::count_if(known, [&](double depth) { return std::abs(depth - distance) > reach; });
+  const auto count = static_cast<double>(known.size());
+  return count <= std::numbers::pi * radius * radius && static_cast<double>(further) <= k_stray * count;
 }
 
 std::vector<View> PoseSpace::seen_through_lenses(const Camera& camera) const {

@@ -60,9 +60,9 @@ class PoseSpace {
   const PoseBody& body() const { return body_; }
   const glm::dmat3& camera_axes() const { return camera_axes_; }  ///< columns, in the world
   double radius() const { return radius_; }                       ///< of the object about its origin, world
-  /// True if the pixels that have a depth, in the first channel where alpha is not 0, may be those of the object alone:
-  /// they are no more than its sphere could cover about where it begins, and none is further from there along the axis
-  /// than its radius, or where a translation is looked for its diameter.
+  /// True if the pixels that have a depth may be those of the object alone: they are no more than its sphere could cover
+  /// where it begins, and but for stray ones none is further from there along the axis than its radius; or where a
+  /// translation is looked for than its diameter from the median of them, and no more than it could cover there.
   bool may_cover(const Image& depths) const;
   double radius_ndc() const { return radius_ndc_; }
   /// World lengths of 1 NDC at a distance along the camera's axis, in relation to those at the object.

@@ -129,6 +129,27 @@ TEST_SUITE("pipeline") {
     check_near(find(device, body_scene(), {}, method, moved(12, {0.05, 0.05, 0.1})), 1, 0.03);
   }
 
+  TEST_CASE("search: depths of an object tell how far away it is, and not those of more") {
+    if (test::is_reduced()) return;
+    const Device device = open_device();
+    Seen seen(device);
+    LeastSquares method;
+    method.rotations = 288;
+    const auto search = [&](float nearer) {
+      Scene scene = body_scene();
+      scene.meshes[0].transform[3] = glm::vec4(0.5F, 0.2F, nearer, 1);
+      method.depth.image = seen.depth;
+      return PoseSolver(device, scene, {}, {.method = method, .solve_translation = true}).search();
+    };
+    for (const float nearer : {1.2F, -3.0F, -8.0F}) {  // from a distance of 4
+      CAPTURE(nearer);
+      check_found(search(nearer), 1, 0.02);
+    }
+    for (glm::vec4& p : seen.depth.pixels)
+      if (p.x == 0) p.x = 7;  // a wall
+    DPR_CHECK_MESSAGE_HAS(InvalidArgument, search(0), "depth (pose): got depths of more than the object");
+  }
+
   TEST_CASE("depths alone explain an object in pictures of any size, and no other") {
     const Device device = open_device();
     for (const int size : {64, 96, 128, 192}) {
