@@ -142,7 +142,8 @@ struct PoseOptions {
   /// pose, at the finest level: in descents by the initial pose; in least squares by the median over
   /// rotations, by the background alone, or by one colour everywhere, whichever is least; below the square
   /// root of that part if the loss is robust, as that of depths without colours is. Beside colours depths count as far
-  /// as they leave more than half of what quite other depths do. Where the background is unknown,
+  /// as they leave more than half of what quite other depths do. Noise, as large as it is where the background shows,
+  /// does not count unless the loss is robust. Where the background is unknown,
   /// of the pixels that the object covers, and of what these would leave uncovered. A search also needs every
   /// other pose to leave a quarter more, but for those that leave the same.
   float explained = 0.1F;

@@ -141,14 +141,16 @@ std::vector<cl_float4> PictureLevel::measured(const PictureImages& images) const
     }
   };
   Image silhouette = images.silhouette, depth = images.depth;
+  for (glm::vec4& p : silhouette.pixels) p.w = 1;
   for (glm::vec4& p : depth.pixels) p = has_depth(p) ? glm::vec4(p.x, 0, 0, 1) : glm::vec4(0);
   if (silhouette.pixels.empty() && !counts_colors_ && space_.body().is_alone() && space_.may_cover(depth)) {
+    const std::vector<bool> holes = holes_of(depth);
     silhouette = depth;
-    for (glm::vec4& p : silhouette.pixels) p.x = p.w;
+    for (std::size_t i = 0; i < holes.size(); ++i)
+      silhouette.pixels[i] = {silhouette.pixels[i].w, 0, 0, holes[i] ? 0.0F : 1.0F};
   }
-  for (glm::vec4& p : silhouette.pixels) p.w = 1;
   if (has_unknown_background_) add(covered_, k_coverage);
-  if (!silhouette.pixels.empty()) add(resample(silhouette, width(), height()), k_coverage);
+  if (!silhouette.pixels.empty()) add(resample_weighted(silhouette, width(), height()), k_coverage);
   if (!depth.pixels.empty()) add(resample_medians(depth, width(), height()), k_depth);
   return result;
 }

@@ -65,6 +65,33 @@ bool has_depth(const glm::vec4& pixel) {
   return pixel.w > 0 && pixel.x != 0 && std::isfinite(pixel.x) && std::isfinite(pixel.w);
 }
 
+std::vector<bool> holes_of(const Image& depth) {
+  const auto is_any_beside = [&](int column, int row, const std::vector<bool>& marks) {
+    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, depth.height - 1); ++y)
+      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, depth.width - 1); ++x)
+        if (marks[static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width) +
+                  static_cast<std::size_t>(x)])
+          return true;
+    return false;
+  };
+  const auto spread = [&](const std::vector<bool>& marks) {
+    std::vector<bool> result;
+    result.reserve(marks.size());
+    for (int row = 0; row < depth.height; ++row)
+      for (int column = 0; column < depth.width; ++column)
+        result.push_back(is_any_beside(column, row, marks));
+    return result;
+  };
+  // What is left when the pixels with a depth grow by one, and what then has none does.
+  std::vector<bool> known;
+  for (const glm::vec4& pixel : depth.pixels) known.push_back(has_depth(pixel));
+  std::vector<bool> beyond = spread(known);
+  beyond.flip();
+  std::vector<bool> holes = spread(beyond);
+  for (std::size_t i = 0; i < holes.size(); ++i) holes[i] = !holes[i] && !known[i];
+  return holes;
+}
+
 Image resample_medians(const Image& image, int width, int height) {
   Image result(width, height);
   std::vector<float> numbers;

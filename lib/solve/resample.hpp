@@ -1,6 +1,8 @@
 // Images and cameras at another resolution; depths.
 #pragma once
 
+#include <vector>
+
 #include "dpr/camera.hpp"
 #include "dpr/image.hpp"
 #include "dpr/renderer.hpp"
@@ -15,6 +17,9 @@ Image resample_weighted(Image image, int width, int height);
 
 /// True if a pixel of a depth image has one.
 bool has_depth(const glm::vec4& pixel);
+
+/// [pixel] True if it has no depth and lies between such that have one: a sensor's holes, two pixels wide at most.
+std::vector<bool> holes_of(const Image& depth);
 
 /// Medians of the first channel over the areas of new pixels, among those that have an alpha above 0; alpha is
 /// the part of the area that has. Means would mix what lies before an edge with what lies behind it.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <utility>
 
 #include "dpr/aov.hpp"
@@ -145,6 +146,12 @@ TEST_SUITE("pipeline") {
       CAPTURE(nearer);
       check_found(search(nearer), 1, 0.02);
     }
+    const Image whole = seen.depth;
+    std::mt19937 random(3);
+    for (glm::vec4& p : seen.depth.pixels)
+      if (random() % 5 < 2) p.x = 0;  // holes
+    check_found(search(-3), 2, 0.05);
+    seen.depth = whole;
     for (glm::vec4& p : seen.depth.pixels)
       if (p.x == 0) p.x = 7;  // a wall
     DPR_CHECK_MESSAGE_HAS(InvalidArgument, search(0), "depth (pose): got depths of more than the object");
