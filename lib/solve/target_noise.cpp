@@ -45,15 +45,17 @@ TargetNoise noise_of(std::span<const cl_float4> target, std::span<const cl_float
   constexpr double k_most_of_roughness = 2;
   std::vector<double> squares, rough;
   for (std::size_t i = 0; i < target.size(); ++i) {
-    if (picture[i].s[3] > 0) continue;
     const glm::dvec3 difference = rgb(target[i]) - glm::dvec3(background);
-    squares.push_back(glm::dot(difference, difference));
-    const std::size_t x = i % width;
-    if (x > 0 && x + 1 < width && i >= width && i + width < target.size())
-      rough.push_back(roughness(target, width, i));
+    if (!(picture[i].s[3] > 0)) squares.push_back(glm::dot(difference, difference));
   }
-  if (squares.size() < k_least || rough.size() < k_least) return {};
-  const double uncovered = std::min(trimmed_mean(squares), k_most_of_roughness * median(rough));
+  if (squares.size() < k_least) return {};
+  const double beside = trimmed_mean(squares);
+  if (beside == 0) return {};
+  for (std::size_t i = width; i + width < target.size(); ++i)
+    if (!(picture[i].s[3] > 0) && i % width != 0 && (i + 1) % width != 0)
+      rough.push_back(roughness(target, width, i));
+  if (rough.size() < k_least) return {};
+  const double uncovered = std::min(beside, k_most_of_roughness * median(rough));
   double halves = 0;  // channels in which half of the noise is cut off
   for (int channel = 0; channel < 3; ++channel)
     halves += background[channel] <= 0 || background[channel] >= 1 ? 1 : 0;
