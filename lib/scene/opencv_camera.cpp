@@ -23,6 +23,15 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
+/// A key as OpenCV's calibration program spells it.
+std::string usual_key(std::string key) {
+  // Programs of OpenCV 2 write Camera_Matrix.
+  std::ranges::transform(key, key.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (key == "cameramatrix") return "camera_matrix";
+  if (key == "distcoeffs" || key == "dist_coeffs") return "distortion_coefficients";
+  return key;
+}
+
 /// The value of a key: what follows on its line, and further lines that are indented.
 struct YamlValue {
   std::size_t line = 0;
@@ -93,9 +102,7 @@ class YamlFile {
     const std::size_t colon = line.find(':');
     if (colon == std::string_view::npos || scan::is_space(line.front()))
       throw IoError(file_, "not YAML as cv::FileStorage writes it: expected KEY: VALUE", number);
-    std::string key(trimmed(line.substr(0, colon)));
-    // Programs of OpenCV 2 write Camera_Matrix.
-    std::ranges::transform(key, key.begin(), [](unsigned char c) { return std::tolower(c); });
+    const std::string key = usual_key(std::string(trimmed(line.substr(0, colon))));
     const auto [entry, is_new] = values_.insert({key, {number, {trimmed(line.substr(colon + 1))}}});
     if (!is_new) throw IoError(file_, scan::quoted(key) + " twice", number);
     return &entry->second;
@@ -179,7 +186,11 @@ OpenCvCamera parse_opencv_camera(const std::filesystem::path& file, std::string_
   OpenCvCamera camera{intrinsics_of(yaml, file), {}, {}};
   camera.distortion = is_fisheye(yaml, file) ? fisheye_lens(yaml, file) : brown_lens(yaml, file);
   const auto width = yaml.whole_number("image_width"), height = yaml.whole_number("image_height");
-  if (!width || !height) return camera;
+  if (!width && !height) return camera;
+  if (!width || !height) {
+    throw InvalidArgument(checks::in(width ? "image_height" : "image_width", file.string()), "none",
+                          width ? "one beside image_width" : "one beside image_height");
+  }
   for (const int side : {*width, *height}) {
     if (side < 1 || side > checks::k_largest_side) {
       throw InvalidArgument(checks::in("image_width and image_height", file.string()),

@@ -45,6 +45,18 @@ TEST_SUITE("unit") {
     CHECK_FALSE(older.size);
   }
 
+  TEST_CASE("the camera of a calibration whose keys are those of OpenCV's functions") {
+    for (const char* const key : {"dist_coeffs", "distCoeffs"}) {
+      const OpenCvCamera camera =
+          parse(matrix("cameraMatrix", "1,0,0,0,1,0,0,0,1") + matrix(key, "-0.25, 0.1, 0, 0"));
+      CHECK(camera.intrinsics == Intrinsics{1, 1, 0.5F, 0.5F});
+      CHECK(camera.distortion == Distortion{-0.25F, 0.1F, 0, 0, 0});
+      CHECK(test::contains(
+          message(k_matrix + matrix(key, "0,0,0,0") + matrix("distortion_coefficients", "0,0,0,0")),
+          "\"distortion_coefficients\" twice"));
+    }
+  }
+
   TEST_CASE("the camera of a calibration of a fisheye") {
     for (const char* const model : {"fisheye_model: 1\n", "distortion_model: equidistant\n"}) {
       const auto lens = [&](const std::string& data) {
@@ -86,6 +98,10 @@ TEST_SUITE("robustness") {
     CHECK(test::contains(message("distortion_model: omnidirectional\n" + k_matrix),
                          "got \"omnidirectional\", expected plumb_bob or equidistant"));
     CHECK(test::contains(message("image_width: 0\nimage_height: 5\n" + k_matrix), "got 0x5"));
+    CHECK(message("image_width: 5\n" + k_matrix) ==
+          "image_height (camera.yml): got none, expected one beside image_width");
+    CHECK(message("image_height: 5\n" + k_matrix) ==
+          "image_width (camera.yml): got none, expected one beside image_height");
     CHECK(test::contains(message("image_width: w\n" + k_matrix), "camera.yml:1: image_width"));
   }
 }
