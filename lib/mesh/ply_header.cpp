@@ -74,7 +74,7 @@ class PlyHeaderReader {
     header.bytes = size_ - lines_.rest().size();
     write_header(read);
     check_size(read);
-    if (!header.binary && has_lists(face)) check_lists(face);
+    if (!header.binary) check_lines(face);
   }
 
   PlyHeader header;
@@ -200,7 +200,7 @@ class PlyHeaderReader {
         texcoords && !texcoords->list_count_type.empty() && is_floating(texcoords->type);
     if (header.has_corner_texcoords) read_as(*texcoords, k_custom_corner_texcoords);
     Property* const texture = find(face, "texnumber");
-    header.has_texture_numbers = texture && texture->list_count_type.empty() && texture->type == "int";
+    header.has_texture_numbers = texture && texture->list_count_type.empty() && !is_floating(texture->type);
     if (header.has_texture_numbers) read_as(*texture, k_custom_texture);
     rename(face, {"vertex_indices", "vertex_index"});
     header.has_custom_properties = has_lists(face) || header.vertex_colors.custom ||
@@ -232,9 +232,9 @@ class PlyHeaderReader {
                   "the file is truncated: its header promises " + std::to_string(least) + " bytes or more");
   }
 
-  // No list of a face in a text may claim more than its line holds, nor may a line hold more: OpenMesh, which
-  // reads number after number, would take the rest for the next element's.
-  void check_lists(const Element& face) {
+  // Every line of a text must hold the numbers of one element, no fewer and no more: OpenMesh, which reads number after
+  // number, would take those of the next line for it, or the rest for the next element's.
+  void check_lines(const Element& face) {
     for (const Element* element = elements_.data(); element != &face; ++element) {
       for (std::uint64_t i = 0; i < element->count && !element->properties.empty() && next_numbers(); ++i) {
         if (words_.size() != element->properties.size())
@@ -242,10 +242,10 @@ class PlyHeaderReader {
                element->name);
       }
     }
-    for (std::uint64_t i = 0; i < face.count && next_numbers(); ++i) check_lists_of_line(face);
+    for (std::uint64_t i = 0; i < face.count && next_numbers(); ++i) check_line_of_face(face);
   }
 
-  void check_lists_of_line(const Element& face) {
+  void check_line_of_face(const Element& face) {
     std::size_t word = 0;
     for (const Property& property : face.properties) {
       if (word >= words_.size()) fail("too few numbers for a face");

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "base/checks.hpp"
 #include "dpr/error.hpp"
 #include "mesh/mesh_reader.hpp"
 #include "mesh/ply_header.hpp"
@@ -129,16 +130,30 @@ void take_corner_texcoords(PlyImporter& importer, Mesh& mesh) {
   }
 }
 
+/// Numbers of textures in any of the types, to [polygon].x.
+template <typename... Numbers>
+void take_texture_numbers(PlyImporter& importer, std::vector<glm::vec3>& of_polygons) {
+  (take_channel<Numbers, OpenMesh::FPropHandleT<Numbers>>(importer, k_custom_texture, 1, 0, of_polygons),
+   ...);
+}
+
 /// [face] the number of its texture in the file.
-std::vector<std::uint32_t> texture_numbers(const PlyHeader& header, PlyImporter& importer) {
+std::vector<std::uint32_t> texture_numbers(const std::filesystem::path& file, const PlyHeader& header,
+                                           PlyImporter& importer, Notes& notes) {
   std::vector<glm::vec3> of_polygons(importer.polygon_ends.size());
-  take_channel<int, OpenMesh::FPropHandleT<int>>(importer, k_custom_texture, 1, 0, of_polygons);
-  take_channel<double, OpenMesh::FPropHandleT<double>>(importer, k_custom_texture, 1, 0, of_polygons);
+  take_texture_numbers<signed char, unsigned char, short, unsigned short, int, unsigned, double>(importer,
+                                                                                                 of_polygons);
   std::vector<std::uint32_t> numbers;
+  bool is_told = false;
   for (std::size_t i = 0; i < of_polygons.size(); ++i) {
     const float number = of_polygons[i].x;
     const bool is_one = number >= 0 && number < static_cast<float>(header.textures.size());
     numbers.resize(importer.polygon_ends[i], is_one ? static_cast<std::uint32_t>(number) : k_no_texture);
+    if (is_one || is_told) continue;
+    is_told = true;
+    notes.push_back(file.string() + ": the texture number " + checks::text(number) +
+                    " (texnumber) is not from 0 to " + std::to_string(header.textures.size() - 1) +
+                    ": such faces have no texture");
   }
   return numbers;
 }
@@ -163,7 +178,7 @@ void take_textures(const std::filesystem::path& file, const PlyHeader& header, P
                     ": its faces have the colours of the file alone");
   }
   if (mesh.textures.empty()) return;
-  mesh.face_textures = texture_numbers(header, importer);
+  mesh.face_textures = texture_numbers(file, header, importer, notes);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     std::uint32_t& number = mesh.face_textures[f];
     if (number != k_no_texture) number = known[number];

@@ -638,13 +638,17 @@ TEST_SUITE("robustness") {
     const auto check = [&](const std::string& body, const std::string& part) {
       DPR_CHECK_MESSAGE_HAS(IoError, read_mesh(folder.write("mesh.ply", head + body)), part);
     };
-    check(k_ply_vertices + "3 0 1 2\n3 0 1", "truncated");
+    check(k_ply_vertices + "3 0 1 2\n3 0 1", "mesh.ply:15: too few numbers for a face");
     check(k_ply_vertices + "3 0 1 2\n", "truncated");
     check("0 0 0\n1 0", "truncated");
     check("", "truncated");
     check("0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n3 0 1 2\n", "mesh.ply:12: got no number where one must be");
     check(k_ply_vertices + "3 0 1 2\n3 0 x 2\n", "mesh.ply:15:");
     check(k_ply_vertices + "3 0 1 2\n2 0 1\n", "face 1 has fewer than three corners");
+    // Numbers enough in all, but not line by line.
+    check("0 0 0\n1 0\n0 0 1 0\n3 0 1 2\n3 0 1 2\n", "mesh.ply:12: expected 3 numbers, of one vertex");
+    check(k_ply_vertices + "4 0 1 2\n0 1 2 0\n", "mesh.ply:14: too few numbers for a face");
+    check(k_ply_vertices + "3 0 1 2 9\n3 0 1 2\n", "mesh.ply:14: too many numbers for a face");
     const std::string lists =
         "element face 1\n" + k_ply_corners + "property list uchar float s\nend_header\n";
     DPR_CHECK_MESSAGE_HAS(
@@ -666,7 +670,7 @@ TEST_SUITE("robustness") {
             "property double y\nproperty double z\nelement face 1\n" +
                 k_ply_corners + "end_header\n")),
         "its header promises 96000000001 bytes or more");
-    check(k_ply_vertices + "4000000000 0 1 2\n3 0 1 2\n", "truncated");
+    check(k_ply_vertices + "4000000000 0 1 2\n3 0 1 2\n", "mesh.ply:14: too few numbers for a face");
     check(k_ply_vertices + "3 0 1 2\n3 0 1 2\n3 0 1 2\n", "goes on after the last face");
     DPR_CHECK_MESSAGE_HAS(InvalidArgument,
                           read_mesh(folder.write("mesh.ply", head + k_ply_vertices + "3 0 1 2\n3 0 1 3\n")),

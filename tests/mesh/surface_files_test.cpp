@@ -307,6 +307,42 @@ TEST_SUITE("unit") {
     }
   }
 
+  TEST_CASE("PLY: numbers of textures in every type of whole numbers, and one of no texture") {
+    const TempDir folder;
+    write_texture(folder / "a.png", two_texels({1, 0, 0}, {0, 0, 1}));
+    const auto check = [&](const std::string& type, auto zero) {
+      using Number = decltype(zero);
+      for (const Form form : k_forms) {
+        CAPTURE(type);
+        PlyBody body(form);
+        body.header +=
+            "comment TextureFile a.png\ncomment TextureFile a.png\nelement vertex 3\nproperty float x\n"
+            "property float y\nproperty float z\nproperty float s\nproperty float t\nelement face 3\n"
+            "property list uchar int vertex_indices\nproperty " +
+            type + " texnumber\nend_header\n";
+        for (const auto& [x, y] : {std::pair{0.0F, 0.0F}, {1.0F, 0.0F}, {0.0F, 1.0F}}) {
+          for (const float number : {x, y, 0.0F, x, y}) body.add(number);
+          body.end_row();
+        }
+        for (const int number : {1, 0, 7}) {
+          body.add_corners({0, 1, 2});
+          body.add(static_cast<Number>(number));
+          body.end_row();
+        }
+        Notes notes;
+        const Mesh mesh = read_mesh(folder.write("mesh.ply", body.header + body.numbers), notes);
+        CHECK(mesh.face_textures == std::vector<std::uint32_t>{1, 0, k_no_texture});
+        CHECK(has_note(notes, "mesh.ply: the texture number 7 (texnumber) is not from 0 to 1"));
+      }
+    };
+    check("char", std::int8_t{});
+    check("uchar", std::uint8_t{});
+    check("short", std::int16_t{});
+    check("ushort", std::uint16_t{});
+    check("int", std::int32_t{});
+    check("uint", std::uint32_t{});
+  }
+
   TEST_CASE("PLY: a texture without coordinates is told, and the colours stay") {
     const TempDir folder;
     write_texture(folder / "a.png", two_texels({1, 0, 0}, {0, 0, 1}));
