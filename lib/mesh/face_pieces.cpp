@@ -78,7 +78,7 @@ class FaceCutter {
     if (pieces_.size() >= most_) {
       throw InvalidArgument("tolerance (subdivision for a lens)",
                             "one that takes more than " + std::to_string(most_) + " faces",
-                            "a larger one, or more new faces allowed");
+                            "a larger one, more new faces allowed, or a camera of less distortion");
     }
     pieces_.push_back({face, {a, b, c}, true});
   }

@@ -337,7 +337,7 @@ TEST_SUITE("unit") {
       CHECK(subdivide_for_lens(scene).meshes[0].face_of.size() < 200000);
       scene.camera.distortion = Distortion{k1, -1e6F, 100, -100, 1e20F};  // nothing that a lens does
       DPR_CHECK_MESSAGE_HAS(InvalidArgument, subdivide_for_lens(scene, {.most_new_faces = 100000}),
-                            "a larger one, or more new faces allowed");
+                            "a larger one, more new faces allowed, or a camera of less distortion");
       scene.camera.distortion = fisheye(0.1F * k1, 0, 0, 0);
       CHECK(subdivide_for_lens(scene).meshes[0].face_of.size() < 200000);
     }
