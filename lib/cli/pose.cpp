@@ -110,7 +110,7 @@ std::string advice(const CLI::App& command, const PoseCommandOptions& options) {
     if (command.count(option) == 0) text += std::string(text.empty() ? "" : "; ") + option + " " + why;
   };
   add("--search", "forgets the start");
-  add("--translation", "finds a displaced object");
+  if (!options.solver.solve_translation) add("--translation", "finds a displaced object");
   if (options.meshes.size() < 2) {
     add("--focal", "finds an unknown focal length");
     add("--distortion", "finds a lens");
@@ -145,7 +145,8 @@ BopImage begin_bop(const CLI::App& command, PoseCommandOptions& options) {
   }
   BopImage image = read_bop_image(options.bop);
   PosePictureFiles& files = options.pictures;
-  if (files.target.empty() && files.silhouette.empty() && files.depth.empty()) files.target = image.picture;
+  if (files.target.empty() && files.silhouette.empty() && files.depth.empty())
+    files.target = bop_picture(options.bop);
   if (!files.depth.empty() && !files.depth_scale) files.depth_scale = image.depth_scale;
   options.solver.solve_translation = true;
   return image;
@@ -212,13 +213,6 @@ Image observe(ObservedPictures pictures, PoseCommandOptions& options) {
   return std::move(pictures.target);
 }
 
-void print_reference(const PoseResult& result, const std::optional<Pose>& truth) {
-  if (!truth) return;
-  std::printf("scene_gt.json: %.3f degrees, %.3f mm away\n",
-              angle_degrees(result.pose.rotation, truth->rotation),
-              glm::length(result.pose.translation - truth->translation));
-}
-
 /// What belongs to a single picture, beside --views.
 void run_views(const CLI::App& command, PoseCommandOptions& options, const CommonOptions& common) {
   for (const char* const other : {"--target", "--mask", "--silhouette", "--depth", "--depth-scale", "--box",
@@ -248,7 +242,6 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
     rotation = rotation_from_vector(parse_vector(options.initial_rotation, k_turn));
   std::optional<BopImage> bop;
   if (!options.bop.folder.empty()) bop = begin_bop(command, options);
-  const std::optional<Pose> truth = bop ? bop->truth : std::nullopt;
   choose_method(command, options);
   options.pictures.mask = options.least_squares.mask;
   ObservedPictures pictures = read_pictures(options.pictures, options.descent.method.loss, common.encoding());
@@ -259,7 +252,9 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   const Device device = open_device(common);
   const std::vector<FoundBody> found =
       solve(command, options, rotation, device, scene, target, bodies, common.quiet);
-  const std::optional<glm::dmat3> true_rotation = truth ? std::optional(truth->rotation) : std::nullopt;
+  const BopInstance* const truth = bop ? nearest_instance(*bop, found.front().result.pose) : nullptr;
+  const std::optional<glm::dmat3> true_rotation =
+      truth != nullptr ? std::optional(truth->pose.rotation) : std::nullopt;
   const PoseTarget observed{target, options.least_squares.method};
   const bool is_table = writes_csv(options);
   FoundLight light;
@@ -269,17 +264,18 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   } else {
     Json json = poses_to_json(scene, found, true_rotation);
     add_light(json, light);
+    if (truth != nullptr) json["gt_id"] = truth->gt_id;
     write_json(options.output, json);
   }
   if (!options.report.empty()) {
-    const std::string& source = bop ? options.bop.folder : options.scene;
-    const std::string title = "The pose of " + std::filesystem::path(source).filename().string();
+    const auto source = bop ? bop_scene_folder(options.bop.folder) : std::filesystem::path(options.scene);
+    const std::string title = "The pose of " + source.filename().string();
     write_pose_report(options.report, page_source(title, common, {&device, 1}), device, scene, found,
                       observed, light, common.quiet, true_rotation);
   }
   if (common.quiet) return;
   print(command, options, found);
-  print_reference(found.front().result, truth);
+  if (bop) print_reference(*bop, found.front().result.pose);
 }
 
 /// Those that are a single image's beside the shared ones.

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <string>
 
+#include "dpr/image.hpp"
 #include "dpr/mesh.hpp"
 #include "dpr/pose.hpp"
 #include "support/command.hpp"
@@ -31,6 +32,11 @@ json rows(const glm::dmat3& matrix) {
   json list;
   for (int i = 0; i < 9; ++i) list.push_back(matrix[i % 3][i / 3]);
   return list;
+}
+
+json object(int number, const dpr::Pose& pose) {
+  const glm::dvec3& t = pose.translation;
+  return json{{"cam_R_m2c", rows(pose.rotation)}, {"cam_t_m2c", {t.x, t.y, t.z}}, {"obj_id", number}};
 }
 
 /// data/models/obj_000005.ply, and of the scene data/test/000002 the image 3 with the objects 1 and 5.
@@ -59,10 +65,6 @@ void write_data(const TempDir& folder) {
   // Pixels from the first one's centre.
   const json camera{{"3", {{"cam_K", {210, 0, 76, 0, 205, 64, 0, 0, 1}}, {"depth_scale", 0.1}}}};
   folder.write("data/test/000002/scene_camera.json", camera.dump());
-  const auto object = [](int number, const dpr::Pose& pose) {
-    const glm::dvec3& t = pose.translation;
-    return json{{"cam_R_m2c", rows(pose.rotation)}, {"cam_t_m2c", {t.x, t.y, t.z}}, {"obj_id", number}};
-  };
   folder.write("data/test/000002/scene_gt.json", json{{"3", {object(1, {}), object(5, k_truth)}}}.dump());
 }
 
@@ -109,6 +111,43 @@ TEST_SUITE("pipeline") {
     CHECK(dpr::angle_degrees(rotation, k_truth.rotation) < 0.1);
     CHECK(glm::length(translation - k_truth.translation) < 2e-3 * k_truth.translation.z);
   }
+
+  TEST_CASE("dpr pose --bop: the start is the first instance, the error that from the nearest") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_data(folder);
+    const dpr::Pose first{dpr::rotation_from_vector({0.1, 0.15, -0.1}) * k_truth.rotation,
+                          k_truth.translation + glm::dvec3(15, 0, 0)};
+    folder.write("data/test/000002/scene_gt.json",
+                 json{{"3", {object(1, {}), object(5, first), object(5, k_truth)}}}.dump());
+    const Outcome outcome = run_line(
+        folder,
+        "pose --bop data/test/000002/ --image 3 --object 5 --rotations 0 -o pose.json --report report");
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    CHECK(contains(outcome.out, "scene_gt.json, the nearest of 2 instances (gt_id 2): 0.0"));
+    const json pose = json::parse(folder.read("pose.json"));
+    CHECK(pose["gt_id"] == 2);
+    CHECK(pose["angle_error_degrees"]["start"].get<double>() > 8);
+    CHECK(pose["angle_error_degrees"]["end"].get<double>() < 0.1);
+    CHECK(contains(folder.read("report/index.html"), "<h1>The pose of 000002</h1>"));
+  }
+
+  TEST_CASE(
+      "dpr pose --bop: other pictures in place of the data set's, and advice where one is not explained") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_data(folder);
+    std::filesystem::rename(folder / "data/test/000002/rgb/000003.png", folder / "seen.png");
+    CHECK(run_line(folder, k_image + "--silhouette seen.png --rotations 0 -o pose.json").status == 0);
+    dpr::write_image(folder / "grey.png", dpr::Image(160, 120, glm::vec4(0.3F, 0.3F, 0.3F, 1)));
+    const Outcome outcome = run_line(
+        folder, "pose --bop data/test/000002 --image 3 --object 5 --target grey.png --rotations 0 -o p.json");
+    CAPTURE(outcome.err);
+    REQUIRE(outcome.status == 0);
+    CHECK(contains(outcome.out, "The target is not explained"));
+    CHECK_FALSE(contains(outcome.out, "--translation"));
+  }
 }
 
 TEST_SUITE("robustness") {
@@ -132,6 +171,24 @@ TEST_SUITE("robustness") {
     check("--bop data/test --image 3 --object 5 -o p.csv", "the folder name \"test\"");
     check("--scene own.json --target t.png -o p.csv", "a .csv without --bop");
     check("--bop data/test/000002 --image 3 --object 5 --models data -o p.json", "obj_000005.ply");
+    for (const char* const number : {"-1", "1.5", "18446744073709551616"}) {
+      const std::string says =
+          "(command line): got " + std::string(number) + ", expected a whole number from 0";
+      check(std::string("--bop data/test/000002 --object 5 -o p.json --image ") + number,
+            ("--image " + says).c_str());
+      check(std::string("--bop data/test/000002 --image 3 -o p.json --object ") + number,
+            ("--object " + says).c_str());
+    }
+    std::filesystem::create_directory(folder / "small");
+    dpr::Mesh point = dpr::make_cube();
+    for (glm::vec3& p : point.positions) p = glm::vec3(0);
+    dpr::write_mesh(folder / "small/obj_000005.ply", point);
+    check("--bop data/test/000002 --image 3 --object 5 --models small -o p.json",
+          "size of the model (small/obj_000005.ply): got 0, expected a size > 0");
+    folder.write("data/test/000002/scene_camera.json",
+                 R"({"3": {"cam_K": [1, 0, 3, 0, 1, 0, 0, 0, 1], "depth_scale": 0}})");
+    check("--bop data/test/000002 --image 3 --object 5 -o p.json",
+          "3.depth_scale (data/test/000002/scene_camera.json): got 0, expected a finite number > 0");
     folder.write("data/test/000002/scene_camera.json", R"({"3": {"cam_K": [1, 2, 3, 0, 1, 0, 0, 0, 1]}})");
     check("--bop data/test/000002 --image 3 --object 5 -o p.json",
           "3.cam_K (data/test/000002/scene_camera.json)");
