@@ -133,12 +133,12 @@ void Page::add_facts(const std::vector<TableRow>& rows) {
 }
 
 void Page::add_table(const std::vector<TableRow>& rows) {
-  html_ += "<table>\n";
+  html_ += "<div class=\"wide\"><table>\n";
   for (const TableRow& row : rows) {
     const char* const tag = &row == &rows.front() ? "th" : "td";
     add_row(row, tag, tag);
   }
-  html_ += "</table>\n";
+  html_ += "</table></div>\n";
 }
 
 void Page::add_pictures(const std::vector<Picture>& pictures) {
@@ -155,8 +155,9 @@ void Page::add_player(const std::vector<Picture>& fixed, const std::vector<std::
            " hidden>\n" + figures(fixed) +
            "</div>\n<div class=\"controls\" hidden><button type=\"button\">Play</button>"
            "<input type=\"range\" aria-label=\"frame\" min=\"0\" value=\"0\" max=\"" +
-           std::to_string(last) + "\"></div>\n<details open><summary>The " + std::to_string(rows.size()) +
-           " pictures</summary>\n<div class=\"rows\" " + count("row", row) + ">\n";
+           std::to_string(last) + "\"></div>\n<details open><summary>The " +
+           (rows.size() == 1 ? "picture" : std::to_string(rows.size()) + " pictures") +
+           "</summary>\n<div class=\"rows\" " + count("row", row) + ">\n";
   for (const std::vector<Picture>& pictures : rows)
     html_ += "<div class=\"row\">\n" + figures(pictures) + "</div>\n";
   html_ += "</div></details>\n</section>\n";

@@ -45,7 +45,7 @@ class Page {
   void add_paragraph(const std::string& text);
   /// Names of values beside them.
   void add_facts(const std::vector<TableRow>& rows);
-  /// The first row names the columns.
+  /// The first row names the columns. A table wider than the page scrolls sideways.
   void add_table(const std::vector<TableRow>& rows);
   /// Beside each other, as the width allows.
   void add_pictures(const std::vector<Picture>& pictures);

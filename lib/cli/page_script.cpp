@@ -54,6 +54,9 @@ figcaption { font-size: 85%; color: var(--quiet); padding-top: 0.2em; }
 table { border-collapse: collapse; margin: 1em 0; }
 td, th { min-width: 3.5em; padding: 0.2em 1em 0.2em 0; text-align: left; vertical-align: top; border-bottom: 1px solid var(--line);
   font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+.wide { overflow-x: auto; margin: 1em 0; }
+.wide table { margin: 0; }
+.wide td { white-space: nowrap; }
 th { font-weight: normal; color: var(--quiet); overflow-wrap: normal; }
 </style>
 )";

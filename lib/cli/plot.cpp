@@ -7,14 +7,18 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string_view>
 #include <system_error>
 
+#include "base/checks.hpp"
 #include "base/child_process.hpp"
 #include "base/output_file.hpp"
 #include "dpr/error.hpp"
@@ -29,16 +33,37 @@ void write_data(std::ostream& script, std::size_t index, const std::vector<doubl
   script << "EOD\n";
 }
 
+/// A round distance of few marks on a linear axis of these curves; none of curves of one value.
+std::optional<double> tic_distance(const std::vector<Curve>& curves) {
+  constexpr double k_most_tics = 6;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const Curve& curve : curves) {
+    for (const double y : curve.y) {
+      if (!std::isfinite(y)) continue;
+      low = std::min(low, y);
+      high = std::max(high, y);
+    }
+  }
+  if (!(low < high)) return {};
+  const double least = (high - low) / k_most_tics, power = std::pow(10, std::floor(std::log10(least)));
+  for (const double digit : {1.0, 2.0, 5.0})
+    if (digit * power >= least) return digit * power;
+  return 10 * power;
+}
+
 void write_panel(std::ostream& script, const Panel& panel, const std::vector<double>& x, std::size_t& index) {
   std::string command = "plot ";
   for (const Curve& curve : panel.curves) {
     write_data(script, index, x, curve.y);
     if (&curve != &panel.curves.front()) command += ", ";
-    command +=
-        "$data" + std::to_string(index) + " with lines linewidth 2 title " + gnuplot_quote(curve.title);
+    // Points, since a line shows no single value between two gaps.
+    command += "$data" + std::to_string(index) +
+               " with linespoints linewidth 2 pointtype 7 pointsize 0.6 title " + gnuplot_quote(curve.title);
     ++index;
   }
-  script << (panel.log_scale ? "set" : "unset") << " logscale y\n"
+  const auto distance = panel.log_scale ? std::nullopt : tic_distance(panel.curves);
+  script << (panel.log_scale ? "set" : "unset") << " logscale y\nset ytics "
+         << (distance ? checks::text(*distance) : "autofreq") << "\n"
          << (panel.curves.size() > 1 ? "set key tmargin center horizontal Left reverse samplen 2 width 2\n"
                                      : "unset key\n")
          << "set title " << gnuplot_quote(panel.title) << "\n"

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -68,6 +69,37 @@ TEST_SUITE("unit") {
     CHECK(contains(html, "first"));
     CHECK(contains(html, "second"));
     CHECK(contains(html, "max=\"1\""));
+  }
+
+  TEST_CASE("page: a player of one row counts no pictures") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    page.add_player({}, {{{"a.png", "first", 1, 1}}});
+    CHECK(contains(written(folder, page), "<summary>The picture</summary>"));
+  }
+
+  TEST_CASE("page: a table wider than the page scrolls, without broken words") {
+    const TempDir folder;
+    dpr::cli::Page page({"t", "c", "d"});
+    page.add_table({{"place"}, {"-0.0003132, 0.0005218"}});
+    const std::string html = written(folder, page);
+    CHECK(contains(html, "<div class=\"wide\"><table>"));
+    CHECK(contains(html, "</table></div>"));
+    CHECK(contains(html, ".wide { overflow-x: auto;"));
+    CHECK(contains(html, ".wide td { white-space: nowrap; }"));
+  }
+
+  TEST_CASE("plot: a single value between two gaps is seen") {
+    const TempDir folder;
+    constexpr double k_none = std::numeric_limits<double>::quiet_NaN();
+    const dpr::cli::Plot one{"x", {0, 1, 2}, {{"Loss", "loss", true, {{"loss", {k_none, 1, k_none}}}}}};
+    if (!dpr::cli::plot(folder / "plot.png", one)) {
+      MESSAGE("skipped: gnuplot is not installed");
+      return;
+    }
+    const Image image = dpr::read_image(folder / "plot.png");
+    const auto is_colored = [](const glm::vec4& p) { return p.g < 0.5F * p.b; };
+    CHECK(std::ranges::count_if(image.pixels, is_colored) > 20);
   }
 
   TEST_CASE("page: a wipe is hidden without script, and says which picture is which") {
