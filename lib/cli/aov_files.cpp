@@ -67,6 +67,13 @@ std::vector<std::filesystem::path> AovFiles::files() const {
   return files;
 }
 
+bool AovFiles::is_name(std::string_view name) {
+  constexpr Aov k_last = Aov::effective_faces;
+  for (int aov = 0; aov <= static_cast<int>(k_last); ++aov)
+    if (name == to_string(static_cast<Aov>(aov))) return true;
+  return name == k_standard_error || name == k_gradient_standard_error;
+}
+
 std::string AovFiles::file_name(std::string_view name) const {
   return std::filesystem::path(output_).replace_extension("." + std::string(name) + ".exr").string();
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "dpr/aov.hpp"
@@ -19,6 +20,8 @@ class AovFiles {
 
   /// Those that write() makes: OUT.NAME.exr for the output OUT.png.
   std::vector<std::filesystem::path> files() const;
+  /// True for a NAME of these files.
+  static bool is_name(std::string_view name);
 
   /// Writes them, from the last forward() of a renderer that draws `drawn`. Returns files(). Faces and barycentrics
   /// are the scene's.

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/input_file.hpp"
+#include "cli/aov_files.hpp"
 #include "cli/target.hpp"
 #include "cli/text.hpp"
 #include "dpr/error.hpp"
@@ -38,6 +39,11 @@ bool is_image(const std::filesystem::path& file) {
   return has_extension(file, extensions);
 }
 
+bool is_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error);
+}
+
 /// Entries of a folder that hold images, in natural order, but for "a.depth.exr" and the like beside "a.png", which
 /// `dpr render --aov` leaves there.
 std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
@@ -45,18 +51,20 @@ std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder
   std::vector<std::filesystem::path> files;
   for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (!std::filesystem::is_directory(entry->path()) && is_image(entry->path()))
-      files.push_back(entry->path());
+    if (!is_folder(entry->path()) && is_image(entry->path())) files.push_back(entry->path());
   }
   if (error) throw IoError(folder, error.message());
   std::set<std::filesystem::path> stems;
   for (const std::filesystem::path& file : files) stems.insert(file.stem());
   std::erase_if(files, [&](const std::filesystem::path& file) {
     const std::filesystem::path stem = file.stem();
-    return file.extension() == ".exr" && stem.has_extension() && stems.contains(stem.stem());
+    const std::string name = stem.extension().string();
+    return file.extension() == ".exr" && !name.empty() && AovFiles::is_name(name.substr(1)) &&
+           stems.contains(stem.stem());
   });
   std::ranges::sort(files, [](const auto& a, const auto& b) {
-    return is_naturally_less(a.filename().string(), b.filename().string());
+    const std::string first = a.stem().string(), second = b.stem().string();
+    return first == second ? a < b : is_naturally_less(first, second);
   });
   return files;
 }
@@ -122,12 +130,13 @@ std::vector<std::filesystem::path> numbered_files(const std::filesystem::path& p
 /// What a name stands for.
 std::vector<std::filesystem::path> files_of(const char* option, const std::string& name) {
   const std::filesystem::path path(name);
-  if (std::filesystem::is_directory(path)) {
+  if (is_folder(path)) {
     std::vector<std::filesystem::path> files = images_in(path);
     if (files.empty()) throw InvalidArgument(named(option, name), "a folder without images", "images in it");
     return files;
   }
-  if (std::filesystem::exists(path)) return {path};
+  std::error_code error;
+  if (std::filesystem::exists(path, error)) return {path};
   const auto numbered = numbered_name(path.filename().string());
   if (!numbered) return {path};  // not there, which is an error when its turn comes
   std::vector<std::filesystem::path> files = numbered_files(path, *numbered);
@@ -137,6 +146,8 @@ std::vector<std::filesystem::path> files_of(const char* option, const std::strin
   }
   return files;
 }
+
+bool are_folders(const std::vector<std::string>& names) { return std::ranges::all_of(names, is_folder); }
 
 std::deque<std::filesystem::path> files_of(const char* option, const std::vector<std::string>& names) {
   std::deque<std::filesystem::path> files;
@@ -174,6 +185,7 @@ bool is_naturally_less(const std::string& a, const std::string& b) {
 Sequence::Sequence(const std::vector<std::string>& names, Encoding encoding, const Scene& scene)
     : option_("--sequence"),
       files_(files_of(option_, names)),
+      are_folders_(are_folders(names)),
       reader_([encoding](const std::string& file) { return read_image(file, nullptr, encoding); }),
       encoding_(encoding),
       size_of_frames_(scene.width, scene.height) {
@@ -185,6 +197,7 @@ Sequence::Sequence(const char* option, const std::vector<std::string>& names, co
                    Reader reader)
     : option_(option),
       files_(files_of(option, names)),
+      are_folders_(are_folders(names)),
       reader_(std::move(reader)),
       size_of_frames_(scene.width, scene.height),
       size_(files_.size()) {
@@ -192,6 +205,21 @@ Sequence::Sequence(const char* option, const std::vector<std::string>& names, co
   if (video != files_.end())
     throw InvalidArgument(named(option, video->string()), "a video", "an image for each frame");
   std::ranges::for_each(files_, require_file);
+}
+
+void Sequence::require_names_of(const Sequence& frames) const {
+  if (!are_folders_ || !frames.are_folders_) return;
+  std::string suffix;
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    const std::string frame = frames.files_[i].stem().string(), own = files_[i].stem().string();
+    if (i == 0 && own.starts_with(frame)) suffix = own.substr(frame.size());
+    const bool is_number = !suffix.empty() && suffix.front() >= '0' && suffix.front() <= '9';
+    if (own == frame + suffix && !is_number) continue;
+    throw InvalidArgument("images of " + std::string(option_) + " (command line)",
+                          files_[i].filename().string() + " for " + frames.files_[i].filename().string(),
+                          "names as in the folder of --sequence, with one suffix or none, or a pattern or a "
+                          "list of files");
+  }
 }
 
 std::optional<SequenceFrame> Sequence::next() {

@@ -36,6 +36,10 @@ class Sequence {
   /// The same of another option, read otherwise. Throws InvalidArgument for videos.
   Sequence(const char* option, const std::vector<std::string>& names, const Scene& scene, Reader reader);
 
+  /// Throws InvalidArgument where the files of both are those of folders, as many, and one is not named as the frame in
+  /// its place, but for its extension and a suffix that all have, such as ".depth". Call it before next().
+  void require_names_of(const Sequence& frames) const;
+
   /// None behind the last. Throws IoError, and InvalidArgument for a frame of another size.
   std::optional<SequenceFrame> next();
   /// Number of all frames; not known with a video among them.
@@ -47,6 +51,7 @@ class Sequence {
 
   const char* option_;
   std::deque<std::filesystem::path> files_;
+  bool are_folders_;  // that the files are in
   Reader reader_;
   Encoding encoding_ = Encoding::linear;  // of videos
   glm::ivec2 size_of_frames_;

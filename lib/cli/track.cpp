@@ -78,7 +78,8 @@ class Frames {
     if (names.empty()) return;
     beside_.push_back({option, Sequence(option, names, scene, reader), member});
     const std::size_t count = *beside_.back().sequence.size();
-    if (!size() || count == *size()) return;
+    if (!size()) return;
+    if (count == *size()) return beside_.back().sequence.require_names_of(images_);
     throw InvalidArgument("images of " + std::string(option) + " (command line)", std::to_string(count),
                           std::to_string(*size()) + ", one for each frame");
   }

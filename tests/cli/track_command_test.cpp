@@ -176,8 +176,50 @@ TEST_SUITE("unit") {
     CHECK(read({"f9.depth.exr"}) == Files{"f9.depth.exr"});
     CHECK(read({"g###.exr", "f9.png"}) == Files{"g009.exr", "g010.exr", "f9.png"});
     DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, read({"f%03d.png"}), "got no file that matches");
+    DPR_CHECK_MESSAGE_HAS(dpr::IoError, read({std::string(5000, 'a')}), "aa: the file does not exist");
     std::filesystem::remove(folder / "f10.png");
     DPR_CHECK_MESSAGE_HAS(dpr::IoError, read({"f#.png"}), "f10.png: the file does not exist");
+  }
+
+  TEST_CASE("sequence: names with points are frames, unless --aov gives them") {
+    const TempDir folder;
+    dpr::Scene scene;
+    scene.width = 2, scene.height = 1;
+    for (const char* name : {"12.25.exr", "12.50.exr", "12.exr", "12.depth.exr", "12.25.standard_error.exr"})
+      dpr::write_image(folder / name, dpr::Image(2, 1, glm::vec4(1)));
+    dpr::cli::Sequence sequence({folder.path().string()}, dpr::Encoding::srgb, scene);
+    for (const char* name : {"12.exr", "12.25.exr", "12.50.exr"}) {
+      const auto frame = sequence.next();
+      REQUIRE(frame);
+      CHECK(std::filesystem::path(frame->file).filename() == name);
+    }
+    CHECK_FALSE(sequence.next());
+  }
+
+  TEST_CASE("sequence: images of a folder beside the frames of another are named as these") {
+    const TempDir folder;
+    dpr::Scene scene;
+    scene.width = 2, scene.height = 1;
+    const auto sequence = [&](const char* option, const std::string& name,
+                              const std::vector<const char*>& files) {
+      std::filesystem::create_directory(folder / name);
+      for (const char* const file : files)
+        dpr::write_image(folder / (name + "/" + file), dpr::Image(2, 1, glm::vec4(1)));
+      const auto read = [](const std::string& file) { return dpr::read_image(file); };
+      return dpr::cli::Sequence(option, {(folder / name).string()}, scene, read);
+    };
+    const auto frames = sequence("--sequence", "frames", {"0.png", "1.png", "10.png"});
+    sequence("--depth", "same", {"0.exr", "1.exr", "10.exr"}).require_names_of(frames);
+    sequence("--depth", "suffix", {"0.depth.exr", "1.depth.exr", "10.depth.exr"}).require_names_of(frames);
+    const auto check = [&](const std::string& name, const std::vector<const char*>& files, const char* says) {
+      DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument, sequence("--depth", name, files).require_names_of(frames),
+                            says);
+    };
+    check("gap", {"0.exr", "1.exr", "11.exr"},
+          "images of --depth (command line): got 11.exr for 10.png, expected names as in the folder of");
+    check("shift", {"1.exr", "10.exr", "11.exr"}, "got 1.exr for 0.png");
+    check("digit", {"00.exr", "10.exr", "100.exr"}, "got 00.exr for 0.png");
+    check("mixed", {"0.depth.exr", "1.depth.exr", "10.mask.exr"}, "got 10.mask.exr for 10.png");
   }
 }
 
