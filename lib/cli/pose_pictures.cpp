@@ -61,6 +61,7 @@ Image read_silhouette(const std::string& file) {
 }
 
 Image read_depth(const std::string& file, std::optional<float> scale) {
+  if (scale) checks::require_positive(*scale, "--depth-scale (command line)");
   PixelFacts facts;
   Image image = read_pixels(file, facts);
   if (!facts.floats && !scale) {

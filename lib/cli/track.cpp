@@ -152,16 +152,17 @@ void Run::print() const {
     lost += row.found.status == TrackStatus::lost ? 1 : 0;
     found += row.found.status == TrackStatus::found ? 1 : 0;
   }
-  std::printf("%s: %zu frames: %zu searched for and found, %zu followed, %zu lost\n", options_.output.c_str(),
-              rows_.size(), found, rows_.size() - found - lost, lost);
+  std::printf("%s: %s: %zu searched for and found, %zu followed, %zu lost\n", options_.output.c_str(),
+              counted(rows_.size(), "frame").c_str(), found, rows_.size() - found - lost, lost);
   if (lost > 0) {
     const bool is_robust = options_.tracker.method.robust || options_.tracker.method.unknown_background;
-    std::printf(
-        "No pose explains a lost frame. %s--explained %g, twice as much, lets more of the object be "
-        "hidden.\n",
+    const double twice = 2 * static_cast<double>(options_.tracker.explained);
+    std::string advice =
         is_robust ? ""
-                  : "--robust bears what the scene lacks, --unknown-background what is behind the object; ",
-        2 * static_cast<double>(options_.tracker.explained));
+                  : " --robust bears what the scene lacks, --unknown-background what is behind the object.";
+    if (twice < 1)
+      advice += format(" --explained %g, twice as much, lets more of the object be hidden.", twice);
+    std::printf("No pose explains a lost frame.%s\n", advice.c_str());
   }
   if (rows_.size() < 2) return;
   const auto others = static_cast<double>(rows_.size() - 1);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <utility>
@@ -83,22 +84,35 @@ class Outliner {
   Renderer renderer_;
 };
 
-/// "frames 0 to 20, 31 to 59" whose status is one; "none".
+/// "frames 0 to 20, 31 to 59" whose status is one; "frame 0"; "none".
 std::string frames_text(const std::vector<TrackRow>& rows, TrackStatus status) {
   std::string text;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < rows.size();) {
     std::size_t end = i;
     while (end < rows.size() && rows[end].found.status == status) ++end;
     if (end > i) {
-      text += (text.empty() ? "frames " : ", ") + std::to_string(rows[i].frame);
+      text += (text.empty() ? "" : ", ") + std::to_string(rows[i].frame);
       if (end > i + 1) text += " to " + std::to_string(rows[end - 1].frame);
     }
+    count += end - i;
     i = std::max(end, i + 1);
   }
-  return text.empty() ? "none" : text;
+  if (count == 0) return "none";
+  return (count == 1 ? "frame " : "frames ") + text;
 }
 
-/// Rotation from the first pose found, and the translation, where the object is not lost; and the losses.
+/// Leaves out what has no values.
+void drop_empty(std::vector<Panel>& panels) {
+  const auto is_empty = [](const Curve& curve) {
+    return std::ranges::none_of(curve.y, [](double y) { return std::isfinite(y); });
+  };
+  for (Panel& panel : panels) std::erase_if(panel.curves, is_empty);
+  std::erase_if(panels, [](const Panel& panel) { return panel.curves.empty(); });
+}
+
+/// Rotation from the first pose found, and the translation, where the object is not lost; and the losses, of a lost
+/// object where they are known.
 Plot track_plot(const std::vector<TrackRow>& rows) {
   constexpr double k_smallest = 1e-12;  // zero has no place on a logarithmic axis
   constexpr double k_none = std::numeric_limits<double>::quiet_NaN();
@@ -109,17 +123,16 @@ Plot track_plot(const std::vector<TrackRow>& rows) {
   for (const TrackRow& row : rows) {
     const TrackedPose& found = row.found;
     x.push_back(static_cast<double>(row.frame));
-    loss.y.push_back(std::max(found.loss, k_smallest));
-    bound.y.push_back(std::max(found.explained_below, k_smallest));
+    loss.y.push_back(is_lost(row) && found.loss == 0 ? k_none : std::max(found.loss, k_smallest));
+    bound.y.push_back(found.explained_below == 0 ? k_none : found.explained_below);
     angle.y.push_back(is_lost(row) ? k_none : angle_degrees(found.pose.rotation, first->found.pose.rotation));
     for (int i = 0; i < 3; ++i)
       places[static_cast<std::size_t>(i)].y.push_back(is_lost(row) ? k_none : found.pose.translation[i]);
   }
-  std::vector<Panel> panels{{"Loss", "loss", true, {loss, bound}}};
-  if (first != rows.end()) {
-    panels.push_back({"Rotation from the first", "degrees", false, {angle}});
-    panels.push_back({"Translation", "world", false, {places.begin(), places.end()}});
-  }
+  std::vector<Panel> panels{{"Loss", "loss", true, {loss, bound}},
+                            {"Rotation from the first", "degrees", false, {angle}},
+                            {"Translation", "world", false, {places.begin(), places.end()}}};
+  drop_empty(panels);
   return {"frame", x, panels};
 }
 
@@ -179,15 +192,14 @@ void TrackReport::write(const PageSource& source, const Device& device, const Sc
   std::vector<std::vector<Picture>> pictures;
   for (const Picture& picture : write_frames(device, scene, kept)) pictures.push_back({picture});
   const Plot curves = track_plot(rows);
-  const bool is_plotted = plot(folder_ / "plot.png", curves);
-  if (!is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
+  const bool has_curves = !curves.panels.empty(),
+             is_plotted = has_curves && plot(folder_ / "plot.png", curves);
+  if (has_curves && !is_plotted && !quiet) std::printf("plot.png is left out: gnuplot is not installed\n");
 
   Page page(source);
   page.add_heading("Frames");
-  page.add_paragraph(
-      format("%zu of the %zu frames, with the outline of the object in the pose found; none where it "
-             "is lost.",
-             kept.size(), rows.size()));
+  page.add_paragraph(std::to_string(kept.size()) + " of " + counted(rows.size(), "frame") +
+                     ", with the outline of the object in the pose found; none where it is lost.");
   page.add_player({}, pictures);
   page.add_heading("Result");
   page.add_facts({{"frames", std::to_string(rows.size())},

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "cli/sequence.hpp"
+#include "cli/track_report.hpp"
 #include "dpr/aov.hpp"
 #include "dpr/error.hpp"
 #include "dpr/image.hpp"
@@ -307,6 +308,7 @@ TEST_SUITE("pipeline") {
     const auto outcome = track(folder, "--sequence frames --rotations 64 -o track.json --csv track.csv");
     REQUIRE(outcome.status == 0);
     CHECK(contains(outcome.out, "1 lost\nNo pose explains a lost frame. --robust"));
+    CHECK(contains(outcome.out, "--explained 0.2, twice as much"));
     const std::vector<std::string> rows = lines(folder.read("track.csv"));
     REQUIRE(rows.size() == 1 + k_frames);
     check_row(rows[2], k_first + 1);
@@ -316,6 +318,59 @@ TEST_SUITE("pipeline") {
     const json file = json::parse(folder.read("track.json"));
     CHECK(file["poses"][2]["status"] == "lost");
     CHECK_FALSE(file["poses"][2].contains("transform"));
+  }
+
+  TEST_CASE("dpr track: no --explained is advised that is out of range") {
+    if (is_skipped()) return;
+    const TempDir folder;
+    write_inputs(folder);
+    dpr::write_image(folder / "grey.png", dpr::Image(64, 48, glm::vec4(0.3F, 0.3F, 0.3F, 1)));
+    const auto outcome =
+        track(folder, "--sequence grey.png --explained 0.6 --search-interval 0 --rotations 0 -o track.json");
+    REQUIRE(outcome.status == 0);
+    CHECK(contains(outcome.out, "1 frame: 0 searched for and found, 0 followed, 1 lost"));
+    CHECK_FALSE(contains(outcome.out, "--explained"));
+  }
+
+  TEST_CASE("track report: unknown losses are gaps, and a single frame is told as one") {
+    const TempDir folder;
+    dpr::Scene scene;
+    scene.width = scene.height = 8;
+    scene.camera.view[3].z = -6;
+    scene.meshes.push_back({dpr::make_cube()});
+    const dpr::Device device = dpr::open_device();
+    const dpr::Image image(8, 8, glm::vec4(0, 0, 0, 1));
+    const auto page_of = [&](const std::string& name, const std::vector<dpr::cli::TrackRow>& rows) {
+      dpr::cli::TrackReport report(folder / name);
+      for (const dpr::cli::TrackRow& row : rows) report.add(row, image);
+      report.write({"title", "command", "device"}, device, scene, rows, true);
+      return folder.read(name + "/index.html");
+    };
+    using dpr::TrackStatus;
+    const auto row = [](std::size_t frame, TrackStatus status, double loss, double below) {
+      dpr::cli::TrackRow result{frame, "frame.png", {}, 0};
+      result.found.status = status;
+      result.found.loss = loss;
+      result.found.explained_below = below;
+      return result;
+    };
+    const dpr::cli::TrackRow unseen = row(0, TrackStatus::lost, 0, 0);
+    const std::string single = page_of("single", {unseen});
+    CHECK(contains(single, "1 of 1 frame, with"));
+    CHECK(contains(single, "<td>frame 0</td>"));
+    CHECK_FALSE(contains(single, "plot.png"));
+    const std::string page =
+        page_of("three", {unseen, row(1, TrackStatus::found, 0.5, 2), row(2, TrackStatus::lost, 4, 0)});
+    CHECK(contains(page, "<td>frames 0, 2</td>"));
+    const std::string begin = "<script type=\"application/json\">";
+    if (!contains(page, begin)) {
+      MESSAGE("skipped: gnuplot is not installed");
+      return;
+    }
+    const std::size_t first = page.find(begin) + begin.size();
+    const json data = json::parse(page.substr(first, page.find("</script>", first) - first));
+    CHECK(data["curves"][0]["y"] == json{nullptr, 0.5, 4});
+    CHECK(data["curves"][1]["y"] == json{nullptr, 2, nullptr});
   }
 }
 
@@ -374,6 +429,11 @@ TEST_SUITE("robustness") {
     check("--sequence frames --size 32x32", "got 64x48, expected 32x32");
     check("--sequence frames --sigma 1", "unknown option \"--sigma\"");
     check("--sequence frames --depth-scale 1", "got no --depth");
+    for (const char* const scale : {"0", "-1", "nan", "inf"}) {
+      check(std::string("--sequence frames --depth depths --depth-scale ") + scale,
+            ("--depth-scale (command line): got " + std::string(scale) + ", expected a finite number > 0")
+                .c_str());
+    }
     check("--sequence frames --depth frames", "got whole numbers, expected --depth-scale");
     check("--sequence frames --depth film.mp4 --depth-scale 1",
           "--depth film.mp4 (command line): got a video");
