@@ -149,6 +149,26 @@ std::vector<std::filesystem::path> files_of(const char* option, const std::strin
 
 bool are_folders(const std::vector<std::string>& names) { return std::ranges::all_of(names, is_folder); }
 
+/// The digits of a name, run by run, without zeros in front.
+std::vector<std::string> numbers_in(const std::string& name) {
+  std::vector<std::string> numbers;
+  for (std::size_t first = 0; (first = name.find_first_of(k_digits, first)) != std::string::npos;) {
+    const std::size_t end = std::min(name.find_first_not_of(k_digits, first), name.size());
+    const std::size_t begin = std::min(name.find_first_not_of('0', first), end - 1);
+    numbers.push_back(name.substr(begin, end - begin));
+    first = end;
+  }
+  return numbers;
+}
+
+/// True if both end with the same numbers, as "rgb2_007" and "depth_7"; without any, if one is the other's beginning.
+bool are_named_alike(const std::string& name, const std::string& frame) {
+  const std::vector<std::string> a = numbers_in(name), b = numbers_in(frame);
+  if (a.empty() || b.empty()) return a.empty() && b.empty() && name.starts_with(frame);
+  const std::ptrdiff_t count = std::min(std::ssize(a), std::ssize(b));
+  return std::equal(a.end() - count, a.end(), b.end() - count);
+}
+
 std::deque<std::filesystem::path> files_of(const char* option, const std::vector<std::string>& names) {
   std::deque<std::filesystem::path> files;
   for (const std::string& name : names) {
@@ -209,16 +229,11 @@ Sequence::Sequence(const char* option, const std::vector<std::string>& names, co
 
 void Sequence::require_names_of(const Sequence& frames) const {
   if (!are_folders_ || !frames.are_folders_) return;
-  std::string suffix;
   for (std::size_t i = 0; i < files_.size(); ++i) {
-    const std::string frame = frames.files_[i].stem().string(), own = files_[i].stem().string();
-    if (i == 0 && own.starts_with(frame)) suffix = own.substr(frame.size());
-    const bool is_number = !suffix.empty() && suffix.front() >= '0' && suffix.front() <= '9';
-    if (own == frame + suffix && !is_number) continue;
+    if (are_named_alike(files_[i].stem().string(), frames.files_[i].stem().string())) continue;
     throw InvalidArgument("images of " + std::string(option_) + " (command line)",
                           files_[i].filename().string() + " for " + frames.files_[i].filename().string(),
-                          "names as in the folder of --sequence, with one suffix or none, or a pattern or a "
-                          "list of files");
+                          "the numbers or names of the files of --sequence, or a pattern or a list of files");
   }
 }
 

@@ -36,8 +36,8 @@ class Sequence {
   /// The same of another option, read otherwise. Throws InvalidArgument for videos.
   Sequence(const char* option, const std::vector<std::string>& names, const Scene& scene, Reader reader);
 
-  /// Throws InvalidArgument where the files of both are those of folders, as many, and one is not named as the frame in
-  /// its place, but for its extension and a suffix that all have, such as ".depth". Call it before next().
+  /// Throws InvalidArgument where the files of both are those of folders, as many, and the name of one does not end with
+  /// the number of the frame in its place, or without numbers does not begin with its name. Call it before next().
   void require_names_of(const Sequence& frames) const;
 
   /// None behind the last. Throws IoError, and InvalidArgument for a frame of another size.

@@ -217,10 +217,16 @@ TEST_SUITE("unit") {
                             says);
     };
     check("gap", {"0.exr", "1.exr", "11.exr"},
-          "images of --depth (command line): got 11.exr for 10.png, expected names as in the folder of");
+          "images of --depth (command line): got 11.exr for 10.png, expected the numbers or names of");
     check("shift", {"1.exr", "10.exr", "11.exr"}, "got 1.exr for 0.png");
-    check("digit", {"00.exr", "10.exr", "100.exr"}, "got 00.exr for 0.png");
-    check("mixed", {"0.depth.exr", "1.depth.exr", "10.mask.exr"}, "got 10.mask.exr for 10.png");
+    check("digit", {"00.exr", "10.exr", "100.exr"}, "got 10.exr for 1.png");
+    check("text", {"a.exr", "b.exr", "c.exr"}, "got a.exr for 0.png");
+    sequence("--depth", "prefix", {"d2_000.exr", "d2_001.exr", "d2_010.exr"}).require_names_of(frames);
+    const auto words = sequence("--sequence", "words", {"left.png", "right.png"});
+    sequence("--depth", "same words", {"left.depth.exr", "right.depth.exr"}).require_names_of(words);
+    DPR_CHECK_MESSAGE_HAS(dpr::InvalidArgument,
+                          sequence("--depth", "others", {"left.exr", "up.exr"}).require_names_of(words),
+                          "got up.exr for right.png");
   }
 }
 
