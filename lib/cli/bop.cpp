@@ -150,14 +150,12 @@ const BopInstance* nearest_instance(const BopImage& image, const Pose& found) {
   return nearest == image.instances.end() ? nullptr : &*nearest;
 }
 
-void print_reference(const BopImage& image, const Pose& found) {
-  const BopInstance* const nearest = nearest_instance(image, found);
-  if (nearest == nullptr) return;
+void print_reference(const BopImage& image, const BopInstance& nearest, const Pose& found) {
   const std::size_t count = image.instances.size();
   const std::string which =
-      count == 1 ? "" : format(", the nearest of %zu instances (gt_id %zu)", count, nearest->gt_id);
+      count == 1 ? "" : format(", the nearest of %zu instances (gt_id %zu)", count, nearest.gt_id);
   std::printf("scene_gt.json%s: %.3f degrees, %.3f mm away\n", which.c_str(),
-              angle_degrees(found.rotation, nearest->pose.rotation), distance(*nearest, found));
+              angle_degrees(found.rotation, nearest.pose.rotation), distance(nearest, found));
 }
 
 std::uint64_t bop_scene_number(const std::string& folder) {

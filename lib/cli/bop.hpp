@@ -54,8 +54,8 @@ Scene bop_scene(const BopOptions& options, const BopImage& image, glm::ivec2 siz
 /// The instance whose origin is nearest to that of the pose; null where there is none.
 const BopInstance* nearest_instance(const BopImage& image, const Pose& found);
 
-/// Prints how far the pose is from the nearest instance; nothing where there is none.
-void print_reference(const BopImage& image, const Pose& found);
+/// Prints how far the pose is from the instance, the nearest.
+void print_reference(const BopImage& image, const BopInstance& nearest, const Pose& found);
 
 /// Number of the scene, which is the name of its folder. Throws InvalidArgument for another name.
 std::uint64_t bop_scene_number(const std::string& folder);

@@ -275,7 +275,7 @@ void run(const CLI::App& command, PoseCommandOptions& options, const CommonOptio
   }
   if (common.quiet) return;
   print(command, options, found);
-  if (bop) print_reference(*bop, found.front().result.pose);
+  if (truth != nullptr) print_reference(*bop, *truth, found.front().result.pose);
 }
 
 /// Those that are a single image's beside the shared ones.

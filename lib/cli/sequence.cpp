@@ -149,15 +149,19 @@ std::vector<std::filesystem::path> files_of(const char* option, const std::strin
 
 bool are_folders(const std::vector<std::string>& names) { return std::ranges::all_of(names, is_folder); }
 
-/// The digits of a name, run by run, without zeros in front.
+/// The digits from a place of a text on, without zeros in front; the place moves behind them.
+std::string number_at(const std::string& text, std::size_t& at) {
+  const std::size_t end = std::min(text.find_first_not_of(k_digits, at), text.size());
+  const std::size_t begin = std::min(text.find_first_not_of('0', at), end);
+  at = end;
+  return text.substr(begin, end - begin);
+}
+
+/// The numbers of a name, one after the other.
 std::vector<std::string> numbers_in(const std::string& name) {
   std::vector<std::string> numbers;
-  for (std::size_t first = 0; (first = name.find_first_of(k_digits, first)) != std::string::npos;) {
-    const std::size_t end = std::min(name.find_first_not_of(k_digits, first), name.size());
-    const std::size_t begin = std::min(name.find_first_not_of('0', first), end - 1);
-    numbers.push_back(name.substr(begin, end - begin));
-    first = end;
-  }
+  for (std::size_t at = 0; (at = name.find_first_of(k_digits, at)) != std::string::npos;)
+    numbers.push_back(number_at(name, at));
   return numbers;
 }
 
@@ -188,12 +192,6 @@ bool is_naturally_less(const std::string& a, const std::string& b) {
       ++i, ++j;
       continue;
     }
-    const auto number_at = [](const std::string& text, std::size_t& at) {
-      const std::size_t end = std::min(text.find_first_not_of(k_digits, at), text.size());
-      const std::size_t begin = std::min(text.find_first_not_of('0', at), end);
-      at = end;
-      return text.substr(begin, end - begin);
-    };
     const std::string m = number_at(a, i), n = number_at(b, j);
     if (m.size() != n.size()) return m.size() < n.size();
     if (m != n) return m < n;

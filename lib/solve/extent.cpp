@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "solve/median.hpp"
+
 namespace dpr {
 namespace {
 
@@ -25,12 +27,6 @@ Image difference_from(const Image& image, const glm::vec3& color) {
     }
   }
   return result;
-}
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 /// Columns and rows that a set of pixels spans.

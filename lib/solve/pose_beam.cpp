@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "solve/median.hpp"
 #include "solve/rotation_grid.hpp"
 
 namespace dpr {
@@ -31,9 +32,7 @@ std::vector<Hypothesis> hypotheses_at(const glm::dvec3& translation, std::size_t
 }
 
 double wrong_loss(PoseLevel& level, std::span<const Hypothesis> hypotheses) {
-  std::vector<double> losses = level.losses(hypotheses);
-  std::ranges::nth_element(losses, losses.begin() + std::ssize(losses) / 2);
-  return losses[losses.size() / 2];
+  return median(level.losses(hypotheses));
 }
 
 std::vector<Candidate> least_losses(PoseLevel& level, std::span<const Hypothesis> hypotheses,

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "scene/lens.hpp"
+#include "solve/median.hpp"
 #include "solve/polar.hpp"
 #include "solve/resample.hpp"
 #include "solve/rotation_grid.hpp"
@@ -154,9 +155,8 @@ bool PoseSpace::may_cover(const Image& depths) const {
   for (const glm::vec4& p : depths.pixels)
     if (has_depth(p)) known.push_back(static_cast<double>(p.x));
   if (known.empty()) return true;
-  const auto middle = known.begin() + std::ssize(known) / 2;
-  std::ranges::nth_element(known, middle);
-  const double distance = translation_ ? *middle : distance_, reach = translation_ ? 2 * radius_ : radius_;
+  const double distance = translation_ ? median(known) : distance_,
+               reach = translation_ ? 2 * radius_ : radius_;
   const double radius = radius_ndc_ / relative_distance(distance) * std::min(depths.width, depths.height) / 2;
   const auto further =
       std::ranges::count_if(known, [&](double depth) { return std::abs(depth - distance) > reach; });

@@ -66,29 +66,31 @@ bool has_depth(const glm::vec4& pixel) {
 }
 
 std::vector<bool> holes_of(const Image& depth) {
-  const auto is_any_beside = [&](int column, int row, const std::vector<bool>& marks) {
-    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, depth.height - 1); ++y)
-      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, depth.width - 1); ++x)
-        if (marks[static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width) +
-                  static_cast<std::size_t>(x)])
-          return true;
-    return false;
-  };
-  const auto spread = [&](const std::vector<bool>& marks) {
-    std::vector<bool> result;
-    result.reserve(marks.size());
-    for (int row = 0; row < depth.height; ++row)
-      for (int column = 0; column < depth.width; ++column)
-        result.push_back(is_any_beside(column, row, marks));
+  const auto width = static_cast<std::size_t>(depth.width);
+  const std::size_t count = depth.pixels.size();
+  // To the pixels around, along rows and then along columns.
+  const auto spread = [&](const std::vector<char>& marks) {
+    std::vector<char> wide = marks;
+    for (std::size_t i = 1; i < count; ++i) {
+      if (i % width == 0) continue;
+      wide[i - 1] |= marks[i];
+      wide[i] |= marks[i - 1];
+    }
+    std::vector<char> result = wide;
+    for (std::size_t i = width; i < count; ++i) {
+      result[i - width] |= wide[i];
+      result[i] |= wide[i - width];
+    }
     return result;
   };
+  std::vector<char> known(count);
+  for (std::size_t i = 0; i < count; ++i) known[i] = has_depth(depth.pixels[i]) ? 1 : 0;
   // What is left when the pixels with a depth grow by one, and what then has none does.
-  std::vector<bool> known;
-  for (const glm::vec4& pixel : depth.pixels) known.push_back(has_depth(pixel));
-  std::vector<bool> beyond = spread(known);
-  beyond.flip();
-  std::vector<bool> holes = spread(beyond);
-  for (std::size_t i = 0; i < holes.size(); ++i) holes[i] = !holes[i] && !known[i];
+  std::vector<char> beyond = spread(known);
+  for (char& mark : beyond) mark ^= 1;
+  beyond = spread(beyond);
+  std::vector<bool> holes(count);
+  for (std::size_t i = 0; i < count; ++i) holes[i] = beyond[i] == 0 && known[i] == 0;
   return holes;
 }
 

@@ -1,7 +1,9 @@
 #include "solve/shape_explained.hpp"
 
 #include <algorithm>
+#include <utility>
 
+#include "solve/median.hpp"
 #include "solve/pose_beam.hpp"
 #include "solve/shape_checks.hpp"
 
@@ -42,9 +44,7 @@ ViewExplanation explain(const ShapeView& view, const glm::vec4& background, cons
 double color_bound(std::span<const ViewExplanation> views, double most) {
   std::vector<double> parts;
   for (const ViewExplanation& view : views) parts.push_back(view.unexplained_part);
-  const auto median = parts.begin() + std::ssize(parts) / 2;
-  std::ranges::nth_element(parts, median);
-  return std::clamp(k_outlier * *median, k_least_outlier * most, most);
+  return std::clamp(k_outlier * median(std::move(parts)), k_least_outlier * most, most);
 }
 
 }  // namespace

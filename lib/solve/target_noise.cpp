@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <vector>
 
+#include "solve/median.hpp"
+
 namespace dpr {
 namespace {
 
 glm::dvec3 rgb(const cl_float4& color) { return {color.s[0], color.s[1], color.s[2]}; }
-
-double median(std::vector<double> numbers) {
-  const auto middle = numbers.begin() + std::ssize(numbers) / 2;
-  std::ranges::nth_element(numbers, middle);
-  return *middle;
-}
 
 /// The mean of those that are not far from the others.
 double trimmed_mean(const std::vector<double>& numbers) {
